@@ -15,13 +15,18 @@ import mujoco
 import numpy as np
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.joint_reading import JointReading
+from rrth_planner.execution.tracked_motion import (
+    missed_stop,
+    track,
+    track_stop,
+    tracked_phase,
+    TrackedMotion,
+)
 from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.arm import forward_kinematics
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
-from rrth_planner.ros.interface.inputs import Input
-from rrth_planner.ros.monitor.execution_tracker import ExecutionTracker
 from rrth_planner.simulation.body_shapes import whole_box
 from rrth_planner.simulation.moving_body import standing_body
 from rrth_planner.simulation.simulated_arm import ArmReading, PERIOD, SimulatedArm
@@ -125,13 +130,14 @@ class _Execution:
         self.clearance = clearance_of(self.arm.physics)
         # Of the commanded curve.
         self.ghost = mujoco.MjData(self.arm.physics.model)
-        self.joints: Input[JointReading | None] = Input('joints', None)
-        self.tracker = ExecutionTracker(self.joints)
+        self.reading: JointReading | None = None
+        self.tracked = TrackedMotion()
         self.least = self.least_commanded = np.inf
         self.efforts: list[tuple[Array, Array]] = []
         self._advance(SETTLING)
         begin = self.arm.time + AHEAD
-        self.tracker.begin(ExecutingMotion(trajectory=motion, start_time=begin), self.arm.time)
+        executing = ExecutingMotion(trajectory=motion, start_time=begin)
+        self.tracked = track(self.tracked, executing, self.reading, self.arm.time)
         self.arm.execute(points_of(motion), begin)
         self.begin, self.is_stopped = begin, False
 
@@ -153,12 +159,12 @@ class _Execution:
     def _stop(self) -> None:
         """Stop the arm as the node does, and see whether it is taken to ignore that."""
         time = self.arm.time
-        phase = self.tracker.phase(time)
+        phase = tracked_phase(self.tracked, self.reading, time)
         if phase is None or not 0.0 < phase < self.motion.duration:
             return
         self.judged.n_stops += 1
         stop = fast_stop(self.motion, phase, the_settings().limits)
-        self.tracker.stop(ExecutingMotion(trajectory=stop, start_time=time))
+        self.tracked = track_stop(self.tracked, ExecutingMotion(trajectory=stop, start_time=time))
         self.arm.execute(points_of(stop), time)
         self.is_stopped = True
         self._watch(stop.duration + SETTLING)
@@ -194,13 +200,14 @@ class _Execution:
 
     def _locate(self, state: ArmReading) -> None:
         """Have the monitor find the arm on its motion, or on its stop."""
-        self.joints.value = JointReading(
+        self.reading = JointReading(
             state.positions, state.velocities, state.time, state.time, np.inf
         )
         self.judged.n_states += 1
-        self.judged.n_suspended += self.tracker.phase(state.time) is None
-        if self.is_stopped and self.tracker.missed_stop(state.time) is not None:
-            self.judged.n_alarms += 1
+        self.judged.n_suspended += tracked_phase(self.tracked, self.reading, state.time) is None
+        if self.is_stopped:
+            self.tracked, missed = missed_stop(self.tracked, self.reading, state.time)
+            self.judged.n_alarms += missed is not None
 
 
 HEADER = (

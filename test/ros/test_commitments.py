@@ -20,6 +20,7 @@ from rrth_planner.execution.body_motion import body_at  # noqa: E402
 from rrth_planner.execution.command import ahead, begin_of  # noqa: E402
 from rrth_planner.execution.commitment import extended  # noqa: E402
 from rrth_planner.execution.executing_motion import ExecutingMotion, MAX_DEVIATION  # noqa: E402
+from rrth_planner.execution.tracked_motion import forget_command  # noqa: E402
 from rrth_planner.model.scene import Box, Scene  # noqa: E402
 from rrth_planner.model.trajectory import sample, Trajectory  # noqa: E402
 from rrth_planner.ros.interface.inputs import RequestError  # noqa: E402
@@ -57,7 +58,7 @@ class Separated(Monitored):
         """Let the motion begin now, from its first point."""
         self.now += 1.0
         # The arm is put to the first point: what it was commanded is over.
-        self.monitor._tracker.forget_command()
+        self.monitor._tracked = forget_command(self.monitor._tracked)
         self.motion = SWING
         self.published.clear()
         self.read(*self.on_time(0.0))
@@ -470,17 +471,6 @@ def test_a_motion_from_rest_begins_with_the_last_instants_of_what_is_commanded(s
     aside = Trajectory([0.0, 1.0], [end + 0.005, end - 0.3], still, still)
     with pytest.raises(RequestError, match='not commanded to rest where its motion begins'):
         arm.command(ExecutingMotion(trajectory=aside, start_time=arm.now + AHEAD))
-
-
-def test_a_command_that_is_not_known_stays_so_when_the_clock_is_set(separated):
-    arm = separated()
-    tracker = arm.monitor._tracker
-    assert tracker.command is tracker.motion is not None
-    tracker.shift(1.0)
-    assert tracker.command is tracker.motion
-    tracker.forget_command()
-    tracker.shift(1.0)
-    assert tracker.command is None and tracker.motion is not None
 
 
 def test_an_arm_that_begins_the_whole_rest_late_is_stopped_when_it_is_given_up(separated):

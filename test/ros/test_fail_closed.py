@@ -15,15 +15,15 @@ pytest.importorskip('fcl')
 from monitored import FAR, Monitored, without_separation  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 import rrth_planner  # noqa: E402
+from rrth_planner.execution import tracked_motion  # noqa: E402
 from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
 from rrth_planner.ros.interface.inputs import Input, Inputs  # noqa: E402
 from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
 from rrth_planner.ros.middleware.qos import LEASE  # noqa: E402
-from rrth_planner.ros.monitor import execution_monitor, execution_tracker  # noqa: E402
+from rrth_planner.ros.monitor import execution_monitor  # noqa: E402
 from rrth_planner.ros.monitor.commitments import Commitments  # noqa: E402
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor  # noqa: E402
-from rrth_planner.ros.monitor.execution_tracker import ExecutionTracker  # noqa: E402
 from rrth_planner.ros.planner import PlannerNode  # noqa: E402
 from rrth_planner.ros.requests.request_queue import PlanQueue  # noqa: E402
 
@@ -156,14 +156,17 @@ def test_a_fault_at_any_call_of_the_monitor_stops_the_arm(monitored, kind, which
 def places():
     """Return what the monitor calls, as (owner, name)."""
     names = 'scene_of is_remaining_free escapes_by_continuing stop_along arm_world'
-    found = [(execution_monitor, name) for name in names.split()]
+    found = [
+        (execution_monitor, name)
+        for name, value in vars(execution_monitor).items()
+        if name in names.split()
+        or (isinstance(value, FunctionType) and value.__module__ == tracked_motion.__name__)
+    ]
     found += [
-        (execution_tracker, name)
-        for name in ('phase_of', 'sample', 'has_missed_stop', 'is_on_other')
+        (tracked_motion, name) for name in ('phase_of', 'sample', 'has_missed_stop', 'is_on_other')
     ]
     for owner in (
         ExecutionMonitor,
-        ExecutionTracker,
         Commitments,
         Inputs,
         Input,

@@ -26,6 +26,7 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
+from rrth_planner.execution.tracked_motion import forget_command  # noqa: E402
 from rrth_planner.model.errors import LONGEST_SENTENCE  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
 from rrth_planner.ros.planner import PlannerNode  # noqa: E402
@@ -196,7 +197,9 @@ class Wire:
     def is_well(self):
         """Return whether good messages are taken, and planned with."""
         # The arm has executed nothing: what it was commanded before does not count.
-        self.planner._monitor._tracker.forget_command()
+        monitor = self.planner._monitor
+        with monitor._lock:
+            monitor._tracked = forget_command(monitor._tracked)
         good = {'body': wearer(), 'target': target(), 'joints': joints()}
         return all(self.say(name, msg) for name, msg in good.items()) and self.plan().success
 

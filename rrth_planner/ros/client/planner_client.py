@@ -22,6 +22,7 @@ from rclpy.parameter_client import AsyncParameterClient
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.task import Future
+from rrth_planner.execution.joint_reading import JointReading
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array, frozen_array
@@ -39,7 +40,6 @@ from rrth_planner.ros.messages.error_codes import ErrorCode
 from rrth_planner.ros.messages.joint_state import (
     configuration_from_msg,
     joint_reading,
-    JointReading,
 )
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg
 from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscription

@@ -41,6 +41,24 @@ from rrth_planner.execution.remaining_motion import (
     is_ray_clear,
     is_remaining_free,
 )
+from rrth_planner.execution.tracked_motion import (
+    check_command,
+    commands,
+    find,
+    forget_command,
+    is_lost,
+    is_over,
+    missed_stop,
+    shifted,
+    track,
+    track_next,
+    track_nothing,
+    track_previous,
+    track_stop,
+    track_stop_again,
+    tracked_phase,
+    TrackedMotion,
+)
 from rrth_planner.model.errors import one_line
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
@@ -52,7 +70,6 @@ from rrth_planner.ros.interface.reporter import Reporter
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.error_codes import ErrorCode
 from rrth_planner.ros.monitor.commitments import Commitments
-from rrth_planner.ros.monitor.execution_tracker import ExecutionTracker
 
 # Period of the checks of the inputs and of the commanded motion [s].
 PERIOD = 0.02
@@ -144,7 +161,7 @@ class ExecutionMonitor:
         self._publishers = publishers
         # All calls come from the node's own thread, but `close` may come from another one.
         self._lock, self._is_closed = RLock(), False
-        self._tracker = ExecutionTracker(inputs.joints)
+        self._tracked = TrackedMotion()
         self._commitments = Commitments(reporter, publishers)
         self._goal: PointingGoal | None = None
         self._state = MonitorState.IDLE
@@ -185,7 +202,7 @@ class ExecutionMonitor:
     @property
     def running(self) -> ExecutingMotion | None:
         """The motion that the arm executes, as far as known."""
-        return self._tracker.motion
+        return self._tracked.motion
 
     def begin(
         self,
@@ -224,10 +241,10 @@ class ExecutionMonitor:
                     f'{self._unsettled_by} less than {SETTLING:g} s ago: the ages of body and '
                     'joints are not known yet',
                 )
-            before = copy(self._tracker), self._parameters, self._goal, self._state
+            before = self._tracked, self._parameters, self._goal, self._state
             commitments = copy(self._commitments)
             try:
-                if planned_from is not None and planned_from is not self._tracker.command:
+                if planned_from is not None and planned_from is not self._tracked.command:
                     raise RequestError(
                         ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
                         'the arm was commanded something else while its motion was planned',
@@ -235,7 +252,8 @@ class ExecutionMonitor:
                 now, delay = self._now(), parameters.controller_delay
                 lead = self._lead_in(planned, joins, now, delay)
                 commanded = self._commitments.begin(planned, parameters, lead)
-                self._tracker.begin(commanded, now, delay, parameters.rest_speed)
+                reading, rest_speed = self._inputs.joints.value, parameters.rest_speed
+                self._tracked = track(self._tracked, commanded, reading, now, delay, rest_speed)
                 self._parameters, self._goal = parameters, goal
                 self._state, self._in_the_way_since = MonitorState.MONITORING, None
                 publish()
@@ -243,7 +261,7 @@ class ExecutionMonitor:
                     commanded.trajectory, parameters, commanded.start_time
                 )
             except Exception:
-                self._tracker, self._parameters, self._goal, self._state = before
+                self._tracked, self._parameters, self._goal, self._state = before
                 self._commitments = commitments
                 raise
             self.n_motions += 1
@@ -258,7 +276,7 @@ class ExecutionMonitor:
         self, planned: ExecutingMotion, joins: float | None, now: float, delay: float
     ) -> Trajectory:
         """Return what is commanded from a little before now until a motion begins."""
-        command, left = self._tracker.command, planned.start_time - begin_of(now, delay)
+        command, left = self._tracked.command, planned.start_time - begin_of(now, delay)
         if joins is None or planned.start_time <= now:
             return rest_at(planned.trajectory, 0.0)
         if command is None and math.isinf(joins):
@@ -287,7 +305,7 @@ class ExecutionMonitor:
                 self.fail('the planner is shutting down', is_replanned=False)
                 if self._state is MonitorState.STOPPING:
                     self._publishers.flush()
-            self._tracker.forget()
+            self._tracked = track_nothing(self._tracked)
             self._commitments.end()
             self._state = MonitorState.IDLE
 
@@ -298,7 +316,9 @@ class ExecutionMonitor:
         What is commanded counts, not where an arm that lags behind is; unless it executes the
         motion more slowly than commanded: then it stops from its phase [s].
         """
-        if self._commitments.is_active or self._tracker.commands(running):
+        if self._commitments.is_active or commands(
+            self._tracked, running, self._inputs.joints.value
+        ):
             phase = now - running.start_time
         parameters = self._parameters
         return stop_along(
@@ -349,8 +369,9 @@ class ExecutionMonitor:
         All times that are known are taken by the new clock: where the arm is, and how old things
         are, does not change by a step.
         """
-        for source in (self._inputs, self._tracker, self._commitments):
+        for source in (self._inputs, self._commitments):
             source.shift(found.step)
+        self._tracked = shifted(self._tracked, found.step)
         if self._in_the_way_since is not None:
             self._in_the_way_since += found.step
         self._withheld_stop = self._withheld_stop and self._withheld_stop.shifted(found.step)
@@ -367,7 +388,7 @@ class ExecutionMonitor:
             if phase is not None and phase < running.trajectory.duration:
                 stop = self._stop_of(running, phase, now)
                 self._publishers.publish_motion(stop.trajectory, self._parameters, 0.0)
-                self._tracker.repeat_stop(stop)
+                self._tracked = track_stop_again(self._tracked, stop)
         self.fail(found.sentence)
 
     def hold(self, until: float) -> ExecutingMotion | None:
@@ -379,7 +400,7 @@ class ExecutionMonitor:
         """
         with self._lock:
             self._commitments.hold(until)
-            return self._tracker.command
+            return self._tracked.command
 
     @property
     def goal(self) -> PointingGoal | None:
@@ -583,7 +604,7 @@ class ExecutionMonitor:
             planned = self._commitments.planned
             motion = self._commitments.extend(now, begin, self._inputs.joints.value, is_clear)
             if motion is not None:
-                self._tracker.replace(motion)
+                self._tracked = track_next(self._tracked, motion)
             if self._commitments.planned is not planned:
                 self._report_switch(False)
 
@@ -607,7 +628,8 @@ class ExecutionMonitor:
 
     def _check_periodically(self) -> None:
         self._check_clock()
-        self._tracker.check_command(self._now(), time.monotonic())
+        reading = self._inputs.joints.value
+        self._tracked = check_command(self._tracked, reading, self._now(), time.monotonic())
         if self._state is not MonitorState.IDLE:
             self._check_inputs()
         if self.pending_stop:
@@ -659,15 +681,15 @@ class ExecutionMonitor:
 
     def _repeat_stop(self, now: float) -> None:
         """Publish the stop again where the arm does not execute it."""
-        found = self._tracker.missed_stop(now)
-        if found is None:
+        before = self._tracked.stopped
+        self._tracked, phase = missed_stop(self._tracked, self._inputs.joints.value, now)
+        if before is None or phase is None:
             return
-        before, phase = found
         stop = self._stop_of(before, phase, now)
         if self._is_withheld(stop, before, now):
             return
         self._publishers.publish_motion(stop.trajectory, self._parameters, stop.start_time)
-        self._tracker.repeat_stop(stop)
+        self._tracked = track_stop_again(self._tracked, stop)
         self._node.get_logger().error(
             'arm did not follow the commanded stop: stop published again'
         )
@@ -678,9 +700,12 @@ class ExecutionMonitor:
         if (
             self._state in (MonitorState.MONITORING, MonitorState.STOPPING)
             and not self._commitments.is_active
-            and self._tracker.follow_previous()
         ):
-            self._report_switch(self._tracker.is_latest)
+            before = self._tracked
+            self._tracked = track_previous(before, self._inputs.joints.value)
+            if self._tracked is before:
+                return
+            self._report_switch(self._tracked.is_latest)
             self._check_remaining_motion(self._inputs.body.value, time.time_ns())
 
     def _report_switch(self, is_latest: bool) -> None:
@@ -716,7 +741,7 @@ class ExecutionMonitor:
         """Withdraw what was reported of an arm that follows its motion now."""
         running = self.running
         # With separation one that it has ignored is not followed any more.
-        is_other = not self._tracker.is_latest or (
+        is_other = not self._tracked.is_latest or (
             self._commitments.is_active and self._is_ignored
         )
         if (
@@ -726,7 +751,7 @@ class ExecutionMonitor:
             and self._commitments.has_moved(
                 reading, running, self._parameters.rest_speed, FOLLOWED
             )
-            and self._tracker.phase(self._now()) is not None
+            and tracked_phase(self._tracked, reading, self._now()) is not None
         ):
             self._n_ignored, self._is_ignored, self._is_doubted = 0, False, False
             self._reporter.unfollowed(DiagnosticStatus.OK, '')
@@ -750,19 +775,20 @@ class ExecutionMonitor:
                 # One that is only late would execute all of it.
                 stop = self._stop_of(running, 0.0, now)
                 self._publishers.publish_motion(stop.trajectory, self._parameters, stop.start_time)
-                self._tracker.stop(stop)
+                self._tracked = track_stop(self._tracked, stop)
             has_moved = self._commitments.has_moved(reading, running, rest_speed)
             self._note_ignored(NOT_FOLLOWED, has_moved)
             self._give_up_motion(NOT_FOLLOWED, self._n_ignored < MOST_IGNORED)
             self._end_motion()
-            self._tracker.forget_command()
+            self._tracked = forget_command(self._tracked)
 
     def _phase(self, now: float) -> float | None:
         """Return the time within the running motion; None where it is over or unknown [s]."""
         is_waiting = self._state is MonitorState.MONITORING and (
             self._commitments.waits_for_reset(now)
         )
-        if self._tracker.is_over(now, self._parameters.rest_speed) and not is_waiting:
+        reading = self._inputs.joints.value
+        if is_over(self._tracked, reading, now, self._parameters.rest_speed) and not is_waiting:
             if self._state is MonitorState.MONITORING and not self._commitments.is_arrived(now):
                 self._give_up_motion(TOO_NEAR)
             elif self._state is MonitorState.MONITORING and self._is_ignored_to_its_end():
@@ -770,12 +796,14 @@ class ExecutionMonitor:
                 self._give_up_motion(NOT_FOLLOWED, is_replanned)
             self._end_motion()
             return None
-        phase = self._tracker.phase(now)
+        phase = tracked_phase(self._tracked, reading, now)
+        if phase is not None:
+            self._tracked = find(self._tracked, now)
         if phase is not None and self._reporter.monitor_state[1] == OFF_TRAJECTORY:
             is_stopping = self._state is MonitorState.STOPPING
             self._set_state(self._state, self.stop_reason if is_stopping else '')
-        is_lost = phase is None and self._tracker.is_lost(now)
-        if is_lost and self._reporter.monitor_state[1] != OFF_TRAJECTORY:
+        has_lost = phase is None and is_lost(self._tracked, now)
+        if has_lost and self._reporter.monitor_state[1] != OFF_TRAJECTORY:
             self._node.get_logger().error(OFF_TRAJECTORY)
             self._set_state(self._state, OFF_TRAJECTORY)
         return phase
@@ -863,7 +891,7 @@ class ExecutionMonitor:
     def _phase_or_elapsed(self, running: ExecutingMotion, now: float) -> float | None:
         """Return the time within a motion, even after an error; None where the arm is off it."""
         try:
-            return self._tracker.phase(now)
+            return tracked_phase(self._tracked, self._inputs.joints.value, now)
         except Exception:
             # The joint states may be what is wrong: then the commanded state counts.
             return now - running.start_time
@@ -883,13 +911,13 @@ class ExecutionMonitor:
                 left = part_of(running.trajectory, rest, running.trajectory.duration)
                 stop = replace(running, trajectory=left, start_time=now)
         else:
-            before = copy(self._tracker)
-            self._tracker.stop(stop)
+            before = self._tracked
+            self._tracked = track_stop(self._tracked, stop)
             try:
                 begin = 0.0 if self._is_unstamped else stop.start_time
                 self._publishers.publish_motion(stop.trajectory, self._parameters, begin)
             except Exception:
-                self._tracker = before
+                self._tracked = before
                 raise
             self._is_unstamped = False
         # From here on nothing may raise: the same stop would be published again.
@@ -919,7 +947,7 @@ class ExecutionMonitor:
         if is_proven or not self._is_separate(motion, now):
             # An error here leaves it to the next body.
             self._publishers.publish_motion(stop.trajectory, self._parameters, stop.start_time)
-            self._tracker.stop(stop)
+            self._tracked = track_stop(self._tracked, stop)
             self._withheld_stop = None
 
     def _is_separate(self, motion: ExecutingMotion, now: float) -> bool:
@@ -944,7 +972,7 @@ class ExecutionMonitor:
 
     def _end_motion(self) -> None:
         """Monitor a motion no longer that has ended, or was given up."""
-        self._tracker.forget()
+        self._tracked = track_nothing(self._tracked)
         self._commitments.end()
         self.pending_stop = ''
         if self._state is MonitorState.MONITORING:

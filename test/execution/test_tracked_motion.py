@@ -1,20 +1,24 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""A missed stop is detected, and an executed one is not taken for it."""
+"""A missed stop is found, an executed one is not taken for it; the clock may be set."""
 
 from hypothesis import assume, given, strategies as st
 import numpy as np
-import pytest
-
-pytest.importorskip('rclpy')
-
-from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
-from rrth_planner.execution.joint_reading import JointReading  # noqa: E402
-from rrth_planner.model.trajectory import sample  # noqa: E402
-from rrth_planner.ros.monitor.execution_tracker import ASIDE, has_missed_stop, LONGEST_LAG  # noqa: E402
-from rrth_planner.timing.fast_stop import fast_stop  # noqa: E402
-from sample_motions import planned_motion  # noqa: E402
-from worlds import examples, limits  # noqa: E402
+from rrth_planner.execution.executing_motion import ExecutingMotion
+from rrth_planner.execution.joint_reading import JointReading
+from rrth_planner.execution.tracked_motion import (
+    ASIDE,
+    forget_command,
+    has_missed_stop,
+    LONGEST_LAG,
+    shifted,
+    track_next,
+    TrackedMotion,
+)
+from rrth_planner.model.trajectory import sample
+from rrth_planner.timing.fast_stop import fast_stop
+from sample_motions import planned_motion
+from worlds import examples, limits
 
 BEGIN = 100.0
 # Period of the readings [s].
@@ -131,3 +135,14 @@ def test_an_arm_that_lags_or_has_stopped_by_itself_misses_no_stop(seed, lag):
         return _at(stopped, early + time)
 
     assert _missed_at(before, stop, stops, stop.trajectory.duration + 0.2) == []
+
+
+def test_a_command_that_is_not_known_stays_so_when_the_clock_is_set():
+    before, _, _ = _stopped(0)
+    tracked = track_next(TrackedMotion(), before)
+    assert tracked.command is tracked.motion is before
+    later = shifted(tracked, 1.0)
+    assert later.command is later.motion
+    assert later.motion.start_time == before.start_time + 1.0
+    unknown = shifted(forget_command(later), 1.0)
+    assert unknown.command is None and unknown.motion.start_time == before.start_time + 2.0
