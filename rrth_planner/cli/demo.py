@@ -27,6 +27,7 @@ from rrth_planner.collision.separation_inspection import (
     Sights,
 )
 from rrth_planner.execution.command import begin_of
+from rrth_planner.execution.separation_status import SeparationState
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.extras import require
 from rrth_planner.io.resources import resource_path
@@ -43,7 +44,6 @@ from rrth_planner.ros.client.planner_client import (
     parameters_of_planner,
     STILL,
 )
-from rrth_planner.ros.interface.separation_status import SeparationState
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.contacts import GREATEST_FORCE
 from rrth_planner.ros.messages.fields import seconds_of

@@ -16,20 +16,21 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rrth_planner.collision import reference_checker, separation  # noqa: E402
 from rrth_planner.collision.reference_checker import separation_violations  # noqa: E402
+from rrth_planner.execution import commitments  # noqa: E402
 from rrth_planner.execution.body_motion import body_at  # noqa: E402
 from rrth_planner.execution.command import ahead, begin_of  # noqa: E402
 from rrth_planner.execution.commitment import extended  # noqa: E402
 from rrth_planner.execution.executing_motion import ExecutingMotion, MAX_DEVIATION  # noqa: E402
+from rrth_planner.execution.separation_status import SeparationState  # noqa: E402
 from rrth_planner.execution.tracked_motion import forget_command  # noqa: E402
 from rrth_planner.model.scene import Box, Scene  # noqa: E402
 from rrth_planner.model.trajectory import sample, Trajectory  # noqa: E402
 from rrth_planner.ros.interface.inputs import RequestError  # noqa: E402
 from rrth_planner.ros.interface.parameters import declare_parameters  # noqa: E402
-from rrth_planner.ros.interface.separation_status import SeparationState  # noqa: E402
 from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
 from rrth_planner.ros.messages.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.messages.marker_edits import BodyPart  # noqa: E402
-from rrth_planner.ros.monitor import commitments, execution_monitor  # noqa: E402
+from rrth_planner.ros.monitor import execution_monitor  # noqa: E402
 from rrth_planner.ros.monitor.execution_monitor import MonitorState, MOST_IGNORED  # noqa: E402
 import worlds  # noqa: E402
 
@@ -112,8 +113,7 @@ class StillClock:
 @pytest.fixture(name='clock', autouse=True)
 def _clock(monkeypatch):
     clock = StillClock()
-    for module in (commitments, execution_monitor):
-        monkeypatch.setattr(module, 'time', clock)
+    monkeypatch.setattr(execution_monitor, 'time', clock)
     return clock
 
 
@@ -190,7 +190,7 @@ def test_beside_a_wearer_each_commitment_continues_the_last_one_and_is_separate(
             ):
                 assert np.abs(now - then).max() <= same
             settings = arm.reporter.parameters.separation
-            body = body_at(arm.monitor._commitments._body, begin, settings.rules)
+            body = body_at(arm.monitor._commitments.body, begin, settings.rules)
             found = separation_violations(
                 ARM, body, trajectory, settings.rules, settings.margin, period=5e-3
             )
@@ -233,8 +233,8 @@ def test_a_sharp_stop_that_a_late_body_did_not_prevent_ends_at_rest_and_says_why
 
 NAMES = [
     name
-    for name, value in vars(commitments.Commitments).items()
-    if isinstance(value, FunctionType) and not name.startswith('__')
+    for name, value in vars(commitments).items()
+    if isinstance(value, FunctionType) and value.__module__ == commitments.__name__
 ]
 
 
@@ -247,7 +247,7 @@ def test_what_fails_for_ever_stops_the_arm_beside_a_wearer(separated, monkeypatc
         n_calls.append(name)
         raise ZeroDivisionError(name)
 
-    monkeypatch.setattr(commitments.Commitments, name, fail)
+    monkeypatch.setattr(commitments, name, fail)
     arm.monitor.brake('of the test')
     arm.frames(5, hand)
     # What was published last ends at rest, and nothing follows it.
@@ -489,13 +489,12 @@ def test_the_whole_rest_that_an_arm_still_executes_is_proven_again(separated):
     arm.period = 1 / 30
     arm.frames(5)
     kept, begin = arm.published[-1]
-    found = arm.monitor._commitments
-    whole = found.present
-    assert found.is_whole
+    whole = arm.monitor._commitments.present
+    assert whole.is_whole
     arm.frames(1, FAR, hand)
-    assert found.present is not whole
+    assert arm.monitor._commitments.present is not whole
     arm.said.clear()
-    while found.present is not whole:
+    while arm.monitor._commitments.present is not whole:
         # The controller has rejected what came since, and goes on with the whole rest.
         assert 'stopped' not in arm.said
         arm.now += arm.period
@@ -513,7 +512,7 @@ def test_the_whole_rest_is_remembered_however_often_it_was_replaced(separated):
     n = len(arm.published)
     arm.frames(2 * commitments.REMEMBERED, FAR, hand)
     assert len(arm.published) > n + commitments.REMEMBERED
-    recent = arm.monitor._commitments._recent
+    recent = arm.monitor._commitments.recent
     # Two have not begun yet.
     assert len(recent) <= commitments.REMEMBERED + 3
     assert recent[0].commitment is kept
@@ -730,7 +729,7 @@ def test_a_part_that_is_faster_than_assumed_slows_the_arm_down(separated):
     jumps = [hand, replace(hand, center=hand.center + 0.08)]
     for k in range(20):
         arm.frames(1, jumps[k % 2])
-    assert arm.monitor._commitments._body.n_faster == 1
+    assert arm.monitor._commitments.body.n_faster == 1
     assert arm.statuses[-1].state is not SeparationState.NORMAL
 
 
@@ -765,7 +764,7 @@ def test_where_a_part_is_faster_than_assumed_the_whole_rest_is_taken_back(separa
     assert arm.monitor._commitments.is_whole
     n = len(arm.published)
     arm.frames(1, replace(hand, center=hand.center - [0.08, 0.0, 0.0]))
-    assert arm.monitor._commitments._body.n_faster == 1
+    assert arm.monitor._commitments.body.n_faster == 1
     assert len(arm.published) == n + 1
     assert arm.statuses[-1].state is not SeparationState.NORMAL
 
@@ -774,7 +773,7 @@ def test_where_commitments_take_longer_to_find_they_begin_later(separated):
     arm, hand, ahead = separated(), near(0.3), []
     arm.see(hand)
     for took in (0.0, 0.012):
-        arm.monitor._commitments._took = took
+        arm.monitor._commitments = replace(arm.monitor._commitments, took=took)
         arm.begin()
         found = []
         for _ in range(10):
@@ -807,15 +806,15 @@ def test_a_commitment_that_comes_when_a_sharp_stop_has_begun_is_not_published(
 
 def test_of_bodies_that_came_together_all_are_seen_and_the_newest_is_checked(separated):
     arm, hand = beside(separated, 0.3, 5)
-    n, sights = len(arm.published), arm.monitor._commitments._body.n_seen
+    n, sights = len(arm.published), arm.monitor._commitments.body.n_seen
     arm.now += FRAME
     arm.read(*arm.commanded(arm.now)[:2])
     part = BodyPart((replace(hand, center=hand.center + 0.08),), float('inf'), arm.now - 0.02)
     body = WearerBody(((('hand', 0), part),))
     arm.monitor.on_body(body, 0, is_newest=False)
     assert len(arm.published) == n
-    assert arm.monitor._commitments._body.n_seen == sights + 1
-    assert arm.monitor._commitments._body.n_faster == 1
+    assert arm.monitor._commitments.body.n_seen == sights + 1
+    assert arm.monitor._commitments.body.n_faster == 1
     arm.frames(1, hand)
     assert len(arm.published) > n
 

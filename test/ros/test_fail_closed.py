@@ -15,14 +15,14 @@ pytest.importorskip('fcl')
 from monitored import FAR, Monitored, without_separation  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 import rrth_planner  # noqa: E402
-from rrth_planner.execution import tracked_motion  # noqa: E402
+from rrth_planner.execution import commitments, tracked_motion  # noqa: E402
+from rrth_planner.execution.commitments import Commitments  # noqa: E402
 from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
 from rrth_planner.ros.interface.inputs import Input, Inputs  # noqa: E402
 from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
 from rrth_planner.ros.middleware.qos import LEASE  # noqa: E402
 from rrth_planner.ros.monitor import execution_monitor  # noqa: E402
-from rrth_planner.ros.monitor.commitments import Commitments  # noqa: E402
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor  # noqa: E402
 from rrth_planner.ros.planner import PlannerNode  # noqa: E402
 from rrth_planner.ros.requests.request_queue import PlanQueue  # noqa: E402
@@ -165,9 +165,14 @@ def places():
     found += [
         (tracked_motion, name) for name in ('phase_of', 'sample', 'has_missed_stop', 'is_on_other')
     ]
+    found += [
+        (commitments, name)
+        for name, value in vars(commitments).items()
+        if isinstance(value, FunctionType) and value.__module__ == commitments.__name__
+    ]
     for owner in (
-        ExecutionMonitor,
         Commitments,
+        ExecutionMonitor,
         Inputs,
         Input,
         WearerBody,

@@ -16,16 +16,12 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.task import Future
+from rrth_planner.execution.separation_status import SeparationState, SeparationStatus
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.errors import RrthError
 from rrth_planner.ros.client.viewer_feed import following, SERVICE, ViewerFeed
-from rrth_planner.ros.interface.separation_status import (
-    RATE_KEY,
-    separation_to_msg,
-    SeparationState,
-    SeparationStatus,
-)
+from rrth_planner.ros.interface.separation_status import RATE_KEY, separation_to_msg
 from rrth_planner.ros.middleware.qos import LATCHED
 from rrth_planner.ros.planner import PlannerNode
 from rrth_planner.ros.playback_node import PlaybackNode

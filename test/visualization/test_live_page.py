@@ -14,12 +14,12 @@ pytest.importorskip('fcl')
 pytest.importorskip('viser')
 
 from rrth_planner.cli.viewer import _served  # noqa: E402
-from rrth_planner.io.arm_file import load_arm  # noqa: E402
-from rrth_planner.model.scene import Scene  # noqa: E402
-from rrth_planner.ros.interface.separation_status import (  # noqa: E402
+from rrth_planner.execution.separation_status import (  # noqa: E402
     SeparationState,
     SeparationStatus,
 )
+from rrth_planner.io.arm_file import load_arm  # noqa: E402
+from rrth_planner.model.scene import Scene  # noqa: E402
 from rrth_planner.visualization.viewer.live_page import LivePage, STATE_COLOURS  # noqa: E402
 from rrth_planner.visualization.viewer.panel import PERIOD, RateChart, SPAN  # noqa: E402
 from rrth_planner.visualization.viewer.scene_view import TIMED  # noqa: E402

@@ -23,6 +23,7 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.task import Future
 from rrth_planner.execution.joint_reading import JointReading
+from rrth_planner.execution.separation_status import SeparationStatus
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array, frozen_array
@@ -34,7 +35,7 @@ from rrth_planner.ros.interface.parameters import (
     parameters_from_values,
     PlannerParameters,
 )
-from rrth_planner.ros.interface.separation_status import separation_from_msg, SeparationStatus
+from rrth_planner.ros.interface.separation_status import separation_from_msg
 from rrth_planner.ros.messages.diagnostics import GIVEN_UP_KEY, REQUEST_KEY
 from rrth_planner.ros.messages.error_codes import ErrorCode
 from rrth_planner.ros.messages.joint_state import (

@@ -21,6 +21,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
+from rrth_planner.execution.separation_status import SeparationStatus
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import MessageError, one_line, OptionsError
 from rrth_planner.model.scene import Scene
@@ -28,7 +29,7 @@ from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.ros.interface.inputs import Inputs
 from rrth_planner.ros.interface.parameters import declare_parameters
 from rrth_planner.ros.interface.scene_monitor import SceneMonitor
-from rrth_planner.ros.interface.separation_status import separation_from_msg, SeparationStatus
+from rrth_planner.ros.interface.separation_status import separation_from_msg
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg
 from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscription

@@ -12,6 +12,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rrth_planner.collision.distance_library import LIBRARIES, require_library
+from rrth_planner.execution.commitments import ExecutionRules
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.settings import (
     HIGHEST_LIMIT,
@@ -190,6 +191,13 @@ class PlannerParameters(PlanSettings):
     def stands_still(self) -> bool:
         """Whether motions are published as they are planned since the body stands still."""
         return self.separates == AUTO and self.separation is None
+
+    @property
+    def execution(self) -> ExecutionRules:
+        """How a motion that is planned with these is executed."""
+        return ExecutionRules(
+            self.separation, self.controller_delay, self.rest_speed, self.resume == MANUAL
+        )
 
 
 def in_effect(parameters: PlannerParameters, source: BodySource) -> PlannerParameters:

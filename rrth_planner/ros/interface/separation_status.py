@@ -2,50 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """How the running motion is executed beside a wearer who moves, and why, as a message."""
 
-from dataclasses import dataclass, replace
-from enum import Enum
+from dataclasses import replace
 import math
 
 from diagnostic_msgs.msg import DiagnosticStatus
+from rrth_planner.execution.separation_status import SeparationState, SeparationStatus
 from rrth_planner.model.errors import MessageError, one_line
 from rrth_planner.ros.messages.diagnostics import status_to_msg
-
-
-class SeparationState(Enum):
-    """How the running motion is executed; the names are those of `~/state`."""
-
-    NORMAL = 0
-    SLOWED = 1
-    PROTECTIVE_STOP = 2
-    FAULT = 3
-    UNSEPARATED = 4
-
-
-@dataclass(frozen=True, slots=True)
-class SeparationStatus:
-    """
-    The state, and its cause.
-
-    Parameters
-    ----------
-    rate : float
-        At which the motion is executed, of the planned one [-].
-    bar, box : str
-        What is not proven apart where the arm stops; empty: nothing.
-
-    """
-
-    state: SeparationState = SeparationState.NORMAL
-    cause: str = ''
-    rate: float = 1.0
-    bar: str = ''
-    box: str = ''
-
-    @property
-    def text(self) -> str:
-        """The name of the state, and its cause."""
-        return f'{self.state.name}: {self.cause}' if self.cause else self.state.name
-
 
 # What a motion beside a body that stands still comes without, and how to have it.
 NO_PROMISE = (

@@ -9,7 +9,6 @@ It fails closed: any error during a check ends in a fail-safe stop.
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from copy import copy
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import partial
@@ -23,15 +22,19 @@ import numpy as np
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rrth_planner.collision.certificate import least_clearance
+from rrth_planner.collision.separation import Blocked
 from rrth_planner.collision.world import arm_world
+from rrth_planner.execution import commitments as given
 from rrth_planner.execution.clock_watch import ClockStep, ClockWatch, watch_clock
 from rrth_planner.execution.command import (
     begin_of,
     continues,
     lead_in,
+    led,
     rest_at,
     stop_along,
 )
+from rrth_planner.execution.commitments import Commitments
 from rrth_planner.execution.executing_motion import ExecutingMotion, MAX_DEVIATION
 from rrth_planner.execution.expected_wearer import is_expected_free
 from rrth_planner.execution.joint_reading import JointReading
@@ -41,6 +44,7 @@ from rrth_planner.execution.remaining_motion import (
     is_ray_clear,
     is_remaining_free,
 )
+from rrth_planner.execution.separation_status import SeparationState, SeparationStatus
 from rrth_planner.execution.tracked_motion import (
     check_command,
     commands,
@@ -69,7 +73,6 @@ from rrth_planner.ros.interface.publishers import PlanPublishers
 from rrth_planner.ros.interface.reporter import Reporter
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.error_codes import ErrorCode
-from rrth_planner.ros.monitor.commitments import Commitments
 
 # Period of the checks of the inputs and of the commanded motion [s].
 PERIOD = 0.02
@@ -162,7 +165,9 @@ class ExecutionMonitor:
         # All calls come from the node's own thread, but `close` may come from another one.
         self._lock, self._is_closed = RLock(), False
         self._tracked = TrackedMotion()
-        self._commitments = Commitments(reporter, publishers)
+        self._commitments = Commitments()
+        # The last body of which that took note.
+        self._seen: WearerBody | None = None
         self._goal: PointingGoal | None = None
         self._state = MonitorState.IDLE
         # A motion planned before a stop must not follow it, nor a replanned motion another one.
@@ -242,7 +247,7 @@ class ExecutionMonitor:
                     'joints are not known yet',
                 )
             before = self._tracked, self._parameters, self._goal, self._state
-            commitments = copy(self._commitments)
+            commitments = self._commitments
             try:
                 if planned_from is not None and planned_from is not self._tracked.command:
                     raise RequestError(
@@ -251,7 +256,7 @@ class ExecutionMonitor:
                     )
                 now, delay = self._now(), parameters.controller_delay
                 lead = self._lead_in(planned, joins, now, delay)
-                commanded = self._commitments.begin(planned, parameters, lead)
+                commanded = self._begin_commitments(planned, parameters, lead)
                 reading, rest_speed = self._inputs.joints.value, parameters.rest_speed
                 self._tracked = track(self._tracked, commanded, reading, now, delay, rest_speed)
                 self._parameters, self._goal = parameters, goal
@@ -271,6 +276,42 @@ class ExecutionMonitor:
             self._run_fail_safe(lambda: self._set_state(MonitorState.MONITORING, ''))
             with suppress(Exception):
                 self._require_listener()
+
+    def _begin_commitments(
+        self, planned: ExecutingMotion, parameters: PlannerParameters, lead: Trajectory
+    ) -> ExecutingMotion:
+        """
+        Return the first commitment of a motion, to be published; without separation all of it.
+
+        lead: what is commanded before that. Raise RequestError where it cannot begin.
+        """
+        if parameters.separation is None:
+            commanded = led(lead, planned)
+            self._commitments = given.end(self._commitments)
+            return commanded
+        if self._commitments.fault:
+            raise RequestError(
+                ErrorCode.FAILURE,
+                'after an error the planner does not move the arm until ~/reset: '
+                f'{self._commitments.fault}',
+            )
+        if self._commitments.body is None:
+            raise RequestError(
+                ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA, 'no body yet, expected one for separation'
+            )
+        found = given.begin(self._commitments, planned, parameters.execution, lead)
+        if isinstance(found, Blocked):
+            raise RequestError(
+                ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
+                f'the motion cannot begin: if {found.box} moves, {found.bar} is not proven '
+                f'separate from it {found.time:.2f} s after the start',
+            )
+        self._commitments = found
+        assert found.sent is not None
+        with suppress(Exception):
+            rate = given.rate_at(found, found.sent.commitment.start_time)
+            self._reporter.separation_status(given.status_of(None, rate, False))
+        return found.sent.motion
 
     def _lead_in(
         self, planned: ExecutingMotion, joins: float | None, now: float, delay: float
@@ -306,7 +347,7 @@ class ExecutionMonitor:
                 if self._state is MonitorState.STOPPING:
                     self._publishers.flush()
             self._tracked = track_nothing(self._tracked)
-            self._commitments.end()
+            self._commitments = given.end(self._commitments)
             self._state = MonitorState.IDLE
 
     def _stop_of(self, running: ExecutingMotion, phase: float, now: float) -> ExecutingMotion:
@@ -339,12 +380,27 @@ class ExecutionMonitor:
 
         def check() -> None:
             self._check_clock()
-            separation = self._reporter.parameters.separation
-            self._commitments.observe(body, separation, self._now())
+            self._observe(body)
             if is_newest:
                 self._check_remaining_motion(body, arrived)
 
         self._run_fail_safe(check)
+
+    def _observe(self, body: WearerBody) -> None:
+        """Take note of a body that came now; the lock is held."""
+        separation = self._reporter.parameters.separation
+        if separation is None:
+            self._commitments, self._seen = replace(self._commitments, body=None), None
+        elif body is not self._seen:
+            parts = (*body.parts, *body.lost)
+            measured = np.array([part.measured for _, part in parts for _ in part.boxes])
+            found = given.observe(
+                self._commitments, scene_of(body), measured, separation, self._now()
+            )
+            self._commitments, self._seen = found, body
+            with suppress(Exception):
+                assert found.body is not None
+                self._reporter.body_observed(found.body)
 
     def check_clock(self) -> None:
         """Stop the arm where the node's clock has stepped; called before a message is read."""
@@ -369,9 +425,9 @@ class ExecutionMonitor:
         All times that are known are taken by the new clock: where the arm is, and how old things
         are, does not change by a step.
         """
-        for source in (self._inputs, self._commitments):
-            source.shift(found.step)
+        self._inputs.shift(found.step)
         self._tracked = shifted(self._tracked, found.step)
+        self._commitments = given.shift(self._commitments, found.step)
         if self._in_the_way_since is not None:
             self._in_the_way_since += found.step
         self._withheld_stop = self._withheld_stop and self._withheld_stop.shifted(found.step)
@@ -399,7 +455,7 @@ class ExecutionMonitor:
         holds that. Without separation it is the whole motion anyway. None: it is not known.
         """
         with self._lock:
-            self._commitments.hold(until)
+            self._commitments = given.hold(self._commitments, until)
             return self._tracked.command
 
     @property
@@ -467,7 +523,7 @@ class ExecutionMonitor:
             self._stop_level = DiagnosticStatus.ERROR if is_fault else level
             self._stop_for_failure()
             with suppress(Exception):
-                self._commitments.fail(why, is_fault)
+                self._fail_commitments(why, is_fault)
         elif self.running is not None and is_fault:
             # The arm stops already; what is planned for after that does not begin.
             self.stop_reason, self.n_stops = why, self.n_stops + 1
@@ -477,7 +533,19 @@ class ExecutionMonitor:
                 with suppress(Exception):
                     self._record_stop(self.running.trajectory, None, is_replanned=False)
             with suppress(Exception):
-                self._commitments.fail(why, is_fault)
+                self._fail_commitments(why, is_fault)
+
+    def _fail_commitments(self, why: str, is_fault: bool) -> None:
+        """Report that the arm stops because of a failure; a fault lasts until `reset`."""
+        rules = self._commitments.rules
+        if rules is None or rules.separation is None:
+            return
+        if is_fault:
+            self._commitments = given.fail(self._commitments, why)
+        state = SeparationState.FAULT if is_fault else SeparationState.PROTECTIVE_STOP
+        # An error in the report must not keep the arm from being stopped.
+        with suppress(Exception):
+            self._reporter.separation_status(SeparationStatus(state, why, 0.0))
 
     def _run_fail_safe(self, check: Callable[[], None]) -> None:
         """Run a check; an error in it ends in a stop."""
@@ -519,7 +587,8 @@ class ExecutionMonitor:
             else:
                 # So far the arm keeps clear of where he will be; so must what it is given next.
                 self._extend(now, begin, partial(self._is_soon_clear, expected))
-            if self._commitments.has_lost_proof(self._now()):
+            self._commitments = given.check_news(self._commitments, self._now())
+            if self._commitments.has_lost_proof:
                 self._stop(phase, now, scene, arrived, NOT_SEPARATE)
         else:
             if self._in_the_way_since is None:
@@ -586,7 +655,9 @@ class ExecutionMonitor:
         assert self.running is not None
         planned = self._commitments.planned
         return (
-            (self.running, phase) if planned is None else (planned, self._commitments.phase(now))
+            (self.running, phase)
+            if planned is None
+            else (planned, given.phase_at(self._commitments, now))
         )
 
     def _extend(
@@ -602,11 +673,38 @@ class ExecutionMonitor:
         """
         if self._commitments.is_active and not self.pending_stop:
             planned = self._commitments.planned
-            motion = self._commitments.extend(now, begin, self._inputs.joints.value, is_clear)
+            motion = self._extend_commitments(now, begin, is_clear)
             if motion is not None:
                 self._tracked = track_next(self._tracked, motion)
             if self._commitments.planned is not planned:
                 self._report_switch(False)
+
+    def _extend_commitments(
+        self, now: float, begin: float, is_clear: Callable[[Trajectory], bool]
+    ) -> ExecutingMotion | None:
+        """Publish the commitment that replaces the newest one; return it if it changed."""
+        found = given.extend(self._commitments, now, self._inputs.joints.value, is_clear)
+        before = self._commitments = found.commitments
+        unchanged = before.sent.motion if found.has_changed and before.sent else None
+        if found.next is None:
+            if found.status is not None:
+                self._reporter.separation_status(found.status)
+            return unchanged
+        took = time.perf_counter() - begin
+        self._commitments = given.note_took(before, took)
+        if took > before.within:
+            # The arm is on its way to rest by then: from there the next one goes on.
+            return unchanged
+        assert found.next.sent is not None
+        message = found.next.sent.motion
+        self._publishers.publish_motion(message.trajectory, self._parameters, message.start_time)
+        self._commitments = given.note_took(found.next, took)
+        # An error in the report must not hide what was published.
+        with suppress(Exception):
+            self._reporter.commitment_published(time.perf_counter() - begin)
+            assert found.status is not None
+            self._reporter.separation_status(found.status)
+        return message
 
     def _holds(
         self, check: Callable[..., bool], running: ExecutingMotion, phase: float, scene: Scene
@@ -748,8 +846,8 @@ class ExecutionMonitor:
             self._is_doubted
             and running is not None
             and not is_other
-            and self._commitments.has_moved(
-                reading, running, self._parameters.rest_speed, FOLLOWED
+            and given.has_moved(
+                self._commitments, reading, running, self._parameters.rest_speed, FOLLOWED
             )
             and tracked_phase(self._tracked, reading, self._now()) is not None
         ):
@@ -762,12 +860,15 @@ class ExecutionMonitor:
         if self._state is not MonitorState.MONITORING or running is None:
             return
         rest_speed = self._parameters.rest_speed
-        if not self._commitments.is_ignored(reading, running, self._parameters):
+        self._commitments, is_ignored = given.note_rest(
+            self._commitments, reading, running, self._parameters.execution
+        )
+        if not is_ignored:
             self._check_followed_motion(reading)
         elif not self._commitments.is_active:
             # It was given all of it, and may be late: it is monitored as long as that takes.
             if not self._is_ignored:
-                has_moved = self._commitments.has_moved(reading, running, rest_speed)
+                has_moved = given.has_moved(self._commitments, reading, running, rest_speed)
                 self._note_ignored(NOT_FOLLOWED, has_moved)
         else:
             now = self._now()
@@ -776,7 +877,7 @@ class ExecutionMonitor:
                 stop = self._stop_of(running, 0.0, now)
                 self._publishers.publish_motion(stop.trajectory, self._parameters, stop.start_time)
                 self._tracked = track_stop(self._tracked, stop)
-            has_moved = self._commitments.has_moved(reading, running, rest_speed)
+            has_moved = given.has_moved(self._commitments, reading, running, rest_speed)
             self._note_ignored(NOT_FOLLOWED, has_moved)
             self._give_up_motion(NOT_FOLLOWED, self._n_ignored < MOST_IGNORED)
             self._end_motion()
@@ -785,11 +886,13 @@ class ExecutionMonitor:
     def _phase(self, now: float) -> float | None:
         """Return the time within the running motion; None where it is over or unknown [s]."""
         is_waiting = self._state is MonitorState.MONITORING and (
-            self._commitments.waits_for_reset(now)
+            given.waits_for_reset(self._commitments, now)
         )
         reading = self._inputs.joints.value
         if is_over(self._tracked, reading, now, self._parameters.rest_speed) and not is_waiting:
-            if self._state is MonitorState.MONITORING and not self._commitments.is_arrived(now):
+            if self._state is MonitorState.MONITORING and not given.is_arrived(
+                self._commitments, now
+            ):
                 self._give_up_motion(TOO_NEAR)
             elif self._state is MonitorState.MONITORING and self._is_ignored_to_its_end():
                 is_replanned = self._commitments.is_active and self._n_ignored < MOST_IGNORED
@@ -844,7 +947,7 @@ class ExecutionMonitor:
         self._stop_level = DiagnosticStatus.WARN
         self._report_stop(stopped, warning, f'; published after {1e3 * took:.2f} ms')
         self._record_stop(stopped.trajectory, None if warning else scene)
-        self._commitments.fail(why, is_fault=False)
+        self._fail_commitments(why, is_fault=False)
 
     def _stop_for_failure(self) -> None:
         """Publish the pending stop with as little code as possible; the lock is held."""
@@ -953,7 +1056,7 @@ class ExecutionMonitor:
     def _is_separate(self, motion: ExecutingMotion, now: float) -> bool:
         """Return whether the rest of a motion is proven separate; not after an error."""
         try:
-            return self._commitments.is_separate(motion, now)
+            return given.is_separate(self._commitments, motion, now)
         except Exception:
             with suppress(Exception):
                 self._node.get_logger().error(traceback.format_exc())
@@ -967,13 +1070,13 @@ class ExecutionMonitor:
         sentence = f'{why}: motion given up'
         self._set_state(MonitorState.STOPPING if is_replanned else MonitorState.HOLDING, sentence)
         self._node.get_logger().warning(sentence)
-        self._commitments.fail(why, is_fault=False)
+        self._fail_commitments(why, is_fault=False)
         self._record_stop(running.trajectory, None, is_replanned)
 
     def _end_motion(self) -> None:
         """Monitor a motion no longer that has ended, or was given up."""
         self._tracked = track_nothing(self._tracked)
-        self._commitments.end()
+        self._commitments = given.end(self._commitments)
         self.pending_stop = ''
         if self._state is MonitorState.MONITORING:
             self._n_ignored, self._is_doubted, self.has_arrived = 0, False, True
@@ -1006,7 +1109,11 @@ class ExecutionMonitor:
     def reset(self) -> str:
         """Allow motions again after a fault, with separation; return what it was."""
         with self._lock:
-            return self._commitments.reset()
+            fault = self._commitments.fault
+            self._commitments = given.reset(self._commitments)
+            if fault:
+                self._reporter.separation_status(SeparationStatus())
+            return fault
 
     def report_hold(self, why: str) -> None:
         """Report that the arm stays where it came to rest."""
