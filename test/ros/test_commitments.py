@@ -713,6 +713,38 @@ def test_a_motion_that_stopped_on_its_way_goes_on_by_itself_or_after_reset(separ
     assert np.abs(arm.commanded(arm.now)[0] - end).max() < 1e-6
 
 
+@pytest.mark.parametrize(
+    ('resume', 'replan'), [('auto', True), ('manual', True), ('manual', False)]
+)
+def test_what_was_stopped_in_motion_is_planned_again_by_itself_or_after_reset(
+    separated, resume, replan
+):
+    arm, hand = beside(separated, 0.3, resume=resume)
+    arm.reporter.parameters = replace(arm.reporter.parameters, replan=replan)
+    arm.monitor.take_stops()
+    arm.monitor.fail('a stale input')
+    found = arm.monitor.take_stops()
+    assert [stop.is_replanned for stop in found] == [resume == 'auto']
+    arm.frames(30, hand)
+    assert arm.monitor.take_stops() == []
+    arm.monitor.reset()
+    found = arm.monitor.take_stops()
+    assert [stop.is_replanned for stop in found] == [True] * (resume == 'manual' and replan)
+    # Once, and never after an error.
+    arm.monitor.reset()
+    assert arm.monitor.take_stops() == []
+
+
+def test_no_reset_goes_on_after_an_error(separated):
+    arm, hand = beside(separated, 0.3, resume='manual')
+    arm.reporter.parameters = replace(arm.reporter.parameters, replan=True)
+    arm.monitor.fail('an error', is_replanned=False)
+    arm.frames(30, hand)
+    arm.monitor.take_stops()
+    arm.monitor.reset()
+    assert arm.monitor.take_stops() == []
+
+
 def test_a_reset_of_a_motion_that_runs_does_not_count_for_its_next_stop(separated):
     arm, hand = beside(separated, 0.2, resume='manual', replan=False)
     arm.monitor.reset()

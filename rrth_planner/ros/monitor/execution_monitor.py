@@ -194,6 +194,8 @@ class ExecutionMonitor:
         # proven and the stop is not: the motion that it ends.
         self._withheld_stop: ExecutingMotion | None = None
         self._stops: deque[Stop] = deque(maxlen=10)
+        # The last stop, where the arm goes on after `reset` only.
+        self._waiting: Stop | None = None
         # The node's clock beside the steady one; by that one, until when no motion begins [s], and
         # why.
         self._clocks: ClockWatch | None = None
@@ -272,6 +274,7 @@ class ExecutionMonitor:
             self.n_motions += 1
             self._withheld_stop, self._is_unstamped = None, False
             self._is_ignored = self.has_arrived = self._is_held = False
+            self._waiting = None
             # From here on the arm moves: an error must stop it.
             self._run_fail_safe(lambda: self._set_state(MonitorState.MONITORING, ''))
             with suppress(Exception):
@@ -980,16 +983,18 @@ class ExecutionMonitor:
             self._record_stop(stopped.trajectory, None, self._is_replanned)
 
     def _record_stop(
-        self, stop: Trajectory, scene: Scene | None, is_replanned: bool = True
+        self, stopped: Trajectory, scene: Scene | None, is_replanned: bool = True
     ) -> None:
         """Keep a stop for `take_stops`, with the wearer that it is proven free of."""
         is_replanned = is_replanned and self._reporter.parameters.replan
-        if self._commitments.is_active and self._parameters.resume == MANUAL:
+        stop = Stop(stopped, self._goal, self._parameters, scene, is_replanned, self.n_motions)
+        is_manual = self._commitments.is_active and self._parameters.resume == MANUAL
+        self._waiting = replace(stop, scene=None) if is_manual and is_replanned else None
+        if is_manual:
             # It goes on after `~/reset`, or a request.
-            is_replanned = False
-        self._is_held = not is_replanned
-        goal, n_motions = self._goal, self.n_motions
-        self._stops.append(Stop(stop, goal, self._parameters, scene, is_replanned, n_motions))
+            stop = replace(stop, is_replanned=False)
+        self._is_held = not stop.is_replanned
+        self._stops.append(stop)
 
     def _phase_or_elapsed(self, running: ExecutingMotion, now: float) -> float | None:
         """Return the time within a motion, even after an error; None where the arm is off it."""
@@ -1107,8 +1112,16 @@ class ExecutionMonitor:
         return f'; the stop is not proven free either, least clearance {clearance:.4f} m'
 
     def reset(self) -> str:
-        """Allow motions again after a fault, with separation; return what it was."""
+        """
+        Allow motions again after a fault, with separation; return what it was.
+
+        A motion that waits for that goes on: also one that was stopped and is planned anew.
+        """
         with self._lock:
+            if self._waiting is not None and self._waiting.n_motions == self.n_motions:
+                self._stops.append(self._waiting)
+                self._is_held = False
+            self._waiting = None
             fault = self._commitments.fault
             self._commitments = given.reset(self._commitments)
             if fault:
