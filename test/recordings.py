@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Files of motion capture as other programs write them, made up."""
 
+import struct
 import warnings
 
 import numpy as np
@@ -49,7 +50,16 @@ def write_c3d(path, names, positions, unit='mm', lost=()):
     import c3d
 
     writer = c3d.Writer(point_rate=RATE, point_units=f'{unit:4}')
-    writer.set_point_labels(names)
+    writer.set_point_labels(names[:255])
+    # The library writes one for each point, and fails where there are more than 255.
+    writer.get('POINT').add_str(
+        'DESCRIPTIONS', '', ' ' * min(len(names), 255), 1, min(len(names), 255)
+    )
+    for k in range(1, (len(names) + 254) // 255):
+        some = names[255 * k : 255 * (k + 1)]
+        width = max(map(len, some))
+        text = ''.join(name.ljust(width) for name in some)
+        writer.get('POINT').add_str(f'LABELS{k + 1}', '', text, width, len(some))
     for k, frame in enumerate(positions):
         points = np.zeros((len(names), 5), dtype=np.float32)
         points[:, :3] = frame
@@ -59,3 +69,13 @@ def write_c3d(path, names, positions, unit='mm', lost=()):
     with warnings.catch_warnings(), path.open('wb') as file:
         warnings.simplefilter('ignore')
         writer.write(file)
+
+
+def set_frames(path, first, last):
+    """Write frame numbers into a C3D as the format has them: two words, the lower one first."""
+    data = bytearray(path.read_bytes())
+    for name, value in ((b'ACTUAL_START_FIELD', first), (b'ACTUAL_END_FIELD', last)):
+        i = data.index(name) + len(name)
+        data[i + 5 : i + 9] = struct.pack('<HH', value % 65536, value // 65536)
+    data[6:10] = struct.pack('<HH', min(first, 65535), min(last, 65535))
+    path.write_bytes(data)

@@ -254,6 +254,12 @@ def viewer() -> argparse.ArgumentParser:
         help='what makes boxes of that recording (%(default)s)',
     )
     add(
+        '--unit',
+        metavar='UNIT',
+        help='of its lengths: m, cm, mm, inch, foot, or how long it is [m] (what it says, or an '
+        'adult measures)',
+    )
+    add(
         '--urdf',
         type=Path,
         metavar='FILE',

@@ -183,8 +183,9 @@ def wearer() -> argparse.ArgumentParser:
     )
     add(
         '--unit',
-        choices=('m', 'cm', 'mm'),
-        help="of a BVH's lengths (guessed by the size of the skeleton)",
+        metavar='UNIT',
+        help='of its lengths: m, cm, mm, inch, foot, or how long it is [m] (what it says, or an '
+        'adult measures)',
     )
     return command
 

@@ -79,7 +79,7 @@ def _run_planning(options: argparse.Namespace) -> None:
     else:
         if options.body:
             raise OptionsError('--person: given with --body, expected one of them')
-        person = load_person(options.person or None, say=partial(say, 'viewer'))
+        person = load_person(options.person or None, unit=options.unit, say=partial(say, 'viewer'))
         skeleton = load_skeleton(options.skeleton)
         scene, _ = body_boxes(skeleton, posture_at(person, 0.0))
     q_start = start_of(arm)

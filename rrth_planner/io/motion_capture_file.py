@@ -2,13 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recorded people from motion capture: BVH (joint angles), C3D (points), and tables of ours."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from itertools import count
+import math
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 import warnings
 
 import numpy as np
+from rrth_planner.io.bvh_text import read_bvh_text
 from rrth_planner.io.extras import require
 from rrth_planner.io.person_file import read_person
 from rrth_planner.io.resources import resource_path
@@ -18,14 +22,20 @@ from rrth_planner.model.errors import RecordError, RrthError
 from rrth_planner.wearer.recorded_person import RecordedPerson
 
 PERSON = 'config/people/construction_work.csv'
-UNITS = {'m': 1.0, 'cm': 1e-2, 'mm': 1e-3}
+UNITS = {'m': 1.0, 'cm': 1e-2, 'mm': 1e-3, 'inch': 0.0254, 'foot': 0.3048}
+# A BVH says nothing of its unit: one of these is taken where it makes the skeleton as large as an
+# adult. Not inches or feet: an upper body in centimetres may be as large as a person in inches.
+GUESSED = ('m', 'cm', 'mm')
 # What is read, and by which library.
 LIBRARIES = {'.bvh': 'pybvh', '.c3d': 'c3d', '.csv': ''}
-# Of one person, or of his upper body alone: the longest side of a box round him [m]. So far apart
-# that no skeleton may be of two units.
-SMALLEST, LARGEST = 0.4, 3.0
+# The skeleton of an adult, or the span of his arms, measures so much from end to end [m].
+SMALLEST, LARGEST = 1.2, 2.3
+# A skeleton that is less tall is an upper body, or crouches [m].
+TALL = 1.1
 # A file may hold so many joints, and so many points in all frames.
 MOST_JOINTS, MOST_POINTS = 1000, 1_000_000
+# The last frame number that the header of a C3D can say.
+FULL = 65535
 
 
 def load_person(
@@ -42,10 +52,11 @@ def load_person(
     path : str or Path, optional
         By default `config/people/construction_work.csv`, a person at work.
     unit : str, optional
-        Of the lengths of the file: m, cm or mm. By default what a C3D says; a BVH says nothing,
-        so that it is guessed from the size of the skeleton. Tables are in metres.
+        Of the lengths of the file: m, cm, mm, inch, foot, or a number, how long it is [m]. By
+        default what a C3D says; a BVH says nothing, so that m, cm or mm is taken where the
+        skeleton is as large as an adult in it. Tables are in metres.
     say : callable, optional
-        Called with a sentence where the unit was guessed.
+        Called with a sentence that says how large the skeleton of a BVH is, and in which unit.
 
     Raises
     ------
@@ -54,14 +65,13 @@ def load_person(
         another unit.
 
     """
-    if unit not in (None, *UNITS):
-        raise RecordError(f'unit: {unit}, expected {", ".join(UNITS)}')
+    scale = None if unit is None else _scale_of(unit)
     file = resource_path(PERSON) if path is None else Path(path)
     suffix = file.suffix.lower()
     if suffix not in LIBRARIES:
         raise RecordError(f'file {file}: expected a name that ends in {", ".join(LIBRARIES)}')
     if suffix == '.csv':
-        if unit not in (None, 'm'):
+        if scale not in (None, 1.0):
             raise RecordError(f'unit: {unit}, expected m for a table')
         return read_person(file)
     require('tools', LIBRARIES[suffix])
@@ -70,7 +80,17 @@ def load_person(
     with naming_file(file, RecordError), _rejecting(suffix):
         if suffix == '.bvh':
             return _from_bvh(file, data, unit, say)
-        return _from_c3d(file, unit)
+        return _from_c3d(file, len(data), unit)
+
+
+def _scale_of(unit: str) -> float:
+    """Return how long a unit is [m]."""
+    if unit in UNITS:
+        return UNITS[unit]
+    with suppress(ValueError):
+        if 0.0 < (scale := float(unit)) < math.inf:
+            return scale
+    raise RecordError(f'unit: {unit}, expected {", ".join(UNITS)} or how long it is [m]')
 
 
 @contextmanager
@@ -94,12 +114,16 @@ def _from_bvh(
     # Imported here: `require` has checked that it is installed.
     import pybvh
 
-    n_nodes = data.count(b'JOINT') + data.count(b'End')
+    n_nodes = data.count(b'JOINT') + data.lower().count(b'end')
     if n_nodes > 2 * MOST_JOINTS:
         raise RecordError(f'{n_nodes} joints and ends, expected at most {MOST_JOINTS} joints')
-    # Which way is up is not asked, and not guessed.
-    motion = pybvh.read_bvh_file(file, world_up='+y')
-    names = tuple(motion.joint_names)
+    found = read_bvh_text(data)
+    with TemporaryDirectory() as folder:
+        copy = Path(folder, 'person.bvh')
+        copy.write_text(found.text, encoding='utf-8')
+        # Which way is up is not asked, and not guessed.
+        motion = pybvh.read_bvh_file(copy, world_up='+y')
+    names = found.names
     _check_size(motion.frame_count, len(names))
     root, turns = motion.to_rotmat()
     tree = motion.fk_topology
@@ -107,17 +131,24 @@ def _from_bvh(
     joints = np.flatnonzero(np.asarray(tree.joint_idx) >= 0)
     numbers = {int(node): k for k, node in enumerate(joints)}
     parents = [numbers.get(int(tree.parent_idx[node]), -1) for node in joints]
-    offsets = np.asarray(tree.offsets, dtype=np.float64)[joints]
-    positions, rotations = forward_kinematics(parents, offsets, np.asarray(root), turns)
+    offsets = np.asarray(tree.offsets, dtype=np.float64)
+    positions, rotations = forward_kinematics(parents, offsets[joints], np.asarray(root), turns)
     if not np.isfinite(positions).all():
         raise RecordError('numbers that are not finite, expected positions and angles')
+    rest = np.zeros_like(offsets)
+    for node, parent in enumerate(np.asarray(tree.parent_idx)):
+        if parent >= 0:
+            rest[node] = rest[parent] + offsets[node]
+    size = _size_of(rest, positions)
     if unit is None:
-        unit = _guessed_unit(positions)
-        say(f'file {file}: lengths taken as {unit} by the size of the skeleton')
+        unit = _guessed_unit(size)
+    scale = _scale_of(unit)
+    named = f'{unit} m' if unit not in UNITS else unit
+    say(f'file {file}: lengths taken as {named}: {_measures(rest, scale, scale * size)}')
     return RecordedPerson(
         names=names,
         rate=1.0 / motion.frame_time,
-        positions=UNITS[unit] * positions,
+        positions=scale * positions,
         rotations=rotations,
     )
 
@@ -156,41 +187,131 @@ def forward_kinematics(
     return positions, rotations
 
 
-def _guessed_unit(positions: Array) -> str:
-    """Return the unit in which a skeleton, (n_frames, n, 3), is as large as a person."""
-    size = float(np.median(np.ptp(positions, axis=1).max(axis=1)))
-    for unit, scale in UNITS.items():
-        if SMALLEST <= scale * size <= LARGEST:
+def _size_of(rest: Array, positions: Array) -> float:
+    """
+    Return how much a skeleton measures from end to end, in the units of the file.
+
+    rest, (n, 3): where joints and ends are without rotations; positions, (n_frames, n, 3).
+    """
+    moving = float(np.median(np.ptp(positions, axis=1).max(axis=1)))
+    return max(float(np.ptp(rest, axis=0).max()), moving)
+
+
+def _measures(rest: Array, scale: float, size: float) -> str:
+    """Return how large a skeleton is, in words; scale: of its units, size: from end to end [m]."""
+    extents = np.ptp(rest, axis=0)
+    # Left and right mirror each other; of the other two axes the longer one is up.
+    skew = [np.abs(np.sort(rest[:, k]) + np.sort(rest[:, k])[::-1]).max() for k in range(3)]
+    lateral = int(np.argmin(np.where(extents > 0.0, skew, np.inf)))
+    height = scale * float(max(extents[k] for k in range(3) if k != lateral))
+    if height >= TALL or height <= 0.0:
+        return f'the skeleton is {max(height, 0.0) or size:.2f} m tall'
+    return f'the skeleton is {height:.2f} m tall, and {size:.2f} m from end to end'
+
+
+def _guessed_unit(size: float) -> str:
+    """Return the unit in which a skeleton of that size from end to end is that of an adult."""
+    for unit in GUESSED:
+        if SMALLEST <= UNITS[unit] * size <= LARGEST:
             return unit
+    would = ', '.join(f'{UNITS[unit] * size:.3g} m in {unit}' for unit in UNITS)
     raise RecordError(
-        f'the skeleton measures {size:.3g} from end to end, expected the size of a person in m, '
-        'cm or mm, or a unit'
+        f'--unit is needed, {", ".join(UNITS)} or how long it is [m]: the skeleton measures '
+        f'{size:.3g} from end to end ({would}), expected {SMALLEST:g} to {LARGEST:g} m '
+        f'in {", ".join(GUESSED)}'
     )
 
 
-def _from_c3d(file: Path, unit: str | None) -> RecordedPerson:
+def _from_c3d(file: Path, n_bytes: int, unit: str | None) -> RecordedPerson:
     import c3d
 
+    class Frames(c3d.Reader):  # type: ignore[misc]
+        """Counts frames from 0, by the data."""
+
+        n_frames = 0
+
+        @property
+        def first_frame(self) -> int:
+            return 0
+
+        @property
+        def last_frame(self) -> int:
+            return self.n_frames - 1
+
     with file.open('rb') as handle:
-        reader = c3d.Reader(handle)
-        labels = [str(label).strip() for label in reader.point_labels]
-        n_frames = reader.last_frame - reader.first_frame + 1
-        _check_size(n_frames, reader.point_used)
+        reader = Frames(handle)
+        labels = _labels(reader)
+        reader.n_frames = _count_frames(reader, n_bytes)
+        _check_size(reader.n_frames, int(reader.point_used))
         if len(labels) > reader.point_used:
             raise RecordError(f'{len(labels)} names of {reader.point_used} points')
         frames = [points for _, points, _ in reader.read_frames()]
         given = unit or _text(reader.get('POINT:UNITS')).lower()
         rate = float(reader.point_rate)
-    if len(frames) != n_frames:
-        raise RecordError(f'{len(frames)} frames, expected {n_frames}: the file is cut off')
-    if given not in UNITS:
+    if len(frames) != reader.n_frames:
+        raise RecordError(f'{len(frames)} frames, expected {reader.n_frames}: the file is cut off')
+    if unit is None and given not in UNITS:
         raise RecordError(f'lengths in "{given}", expected {", ".join(UNITS)}')
     # Columns of a point: its position, the residual, and the cameras; without a name it is noise.
     values = np.array(frames, dtype=np.float64)
     kept = [k for k, label in enumerate(labels) if label]
-    positions = UNITS[given] * values[:, kept, :3]
-    positions[values[:, kept, 3] < 0.0] = np.nan
-    return RecordedPerson(names=tuple(labels[k] for k in kept), rate=rate, positions=positions)
+    positions = _scale_of(given) * values[:, kept, :3]
+    # Some writers leave a gap as zeros: no marker is at the origin to the last bit.
+    is_lost = (values[:, kept, 3] < 0.0) | ~values[:, kept, :3].any(axis=2)
+    positions[is_lost] = np.nan
+    names = without_subject([labels[k] for k in kept])
+    return RecordedPerson(names=names, rate=rate, positions=positions)
+
+
+def _labels(reader: Any) -> list[str]:
+    """Return the names of all points: a parameter holds 255, the next ones are in LABELS2, ..."""
+    labels: list[str] = []
+    for number in count(1):
+        parameter = reader.get(f'POINT:LABELS{number if number > 1 else ""}')
+        if parameter is None:
+            return labels[: reader.point_used] if number > 2 else labels
+        labels += [str(label).strip() for label in parameter.string_array]
+    return labels
+
+
+def without_subject(labels: Sequence[str]) -> tuple[str, ...]:
+    """Return names of points without the subject before a colon, where all have the same."""
+    subjects = {label.partition(':')[0] for label in labels if ':' in label}
+    if len(subjects) != 1 or not all(':' in label for label in labels):
+        return tuple(labels)
+    return tuple(label.partition(':')[2].strip() for label in labels)
+
+
+def _count_frames(reader: Any, n_bytes: int) -> int:
+    """
+    Return the number of frames of a C3D: as its fields say, where they can, else by its size.
+
+    c3d 0.6.0 counts the second word of a start field by 65535, and the header ends at 65535.
+    """
+    header = reader.header
+    first, last = _field(reader, 'START', header.first_frame), None
+    if reader.get('TRIAL:ACTUAL_END_FIELD') is not None:
+        last = _field(reader, 'END', header.last_frame)
+    stated = (super(type(reader), reader).last_frame if last is None else last) - first + 1
+    # Data are in blocks of 512 bytes; a number is a float where the scale is negative.
+    size = 4 if reader.point_scale < 0.0 else 2
+    n_analog = int(reader.analog_used) * int(reader.analog_per_frame)
+    one = size * (4 * int(reader.point_used) + n_analog)
+    data = n_bytes - 512 * (int(header.data_block) - 1)
+    there = data // one if one else 0
+    is_full = header.last_frame >= FULL and last is None
+    if stated < 1 or (is_full and there > stated):
+        return int(there)
+    return int(stated)
+
+
+def _field(reader: Any, name: str, default: int) -> int:
+    """Return a frame number of two words, the lower one first."""
+    parameter = reader.get(f'TRIAL:ACTUAL_{name}_FIELD')
+    if parameter is None:
+        return int(default)
+    words = [int(word) for word in parameter.uint16_array]
+    return words[0] + 65536 * (words[1] if len(words) > 1 else 0)
 
 
 def _text(parameter: Any) -> str:

@@ -86,6 +86,12 @@ SETTINGS = (
         'boxes of one who stands, or a recording; empty: the packaged one',
     ),
     _fixed('skeleton', 'cmu_bvh', 'name or path', 'what makes boxes of a recording'),
+    _fixed(
+        'wearer_unit',
+        '',
+        'm, cm, mm, inch, foot or how long it is [m]',
+        'of the lengths of a recording; empty: what the file says, or an adult measures',
+    ),
     _fixed('wearer_begin', 0.0, 's', 'where a recording begins', 0.0, 1e6),
     _fixed('wearer_end', 0.0, 's', 'where it ends; 0: at its end', 0.0, 1e6),
     _fixed('body_rate', 30.0, 'Hz', 'bodies published per second; 0: none', 0.0, 500.0),
@@ -134,7 +140,9 @@ def simulated_wearer(node: Node) -> SimulatedWearer | None:
         raise OptionsError(f'wearer: "{kind}", expected {NOBODY}, {STANDING} or {RECORDED}')
     say = node.get_logger().info
     person = excerpt(
-        load_person(file, say=say), value['wearer_begin'], value['wearer_end'] or None
+        load_person(file, unit=value['wearer_unit'] or None, say=say),
+        value['wearer_begin'],
+        value['wearer_end'] or None,
     )
     skeleton = load_skeleton(value['skeleton'])
     return SimulatedWearer(recorded_body(person, skeleton), person, skeleton)
