@@ -70,7 +70,7 @@ def load_skeleton(name_or_path: str | Path, stature: Sequence[float] = STATURES)
     data = load_yaml(path)
     with naming_file(path, SceneError):
         skeleton = skeleton_from_mapping(data, adult['parts'], adult['bones'])
-    return replace(skeleton, stature=stature)
+    return replace(skeleton, stature=np.array(stature))
 
 
 def skeleton_from_mapping(

@@ -368,9 +368,7 @@ def _joints(skeleton: Skeleton, posture: Posture) -> Array:
     joints[:-1] = joint_positions(skeleton, posture)
     joints[-1] = np.nan
     base = skeleton.base
-    if base is None:
-        joints[-1] = 0.0
-    elif (
+    if (
         isinstance(base, FrameBase)
         and posture.rotations is not None
         and base.frame in posture.names
