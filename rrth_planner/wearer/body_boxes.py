@@ -62,8 +62,9 @@ def body_boxes(skeleton: Skeleton, posture: Posture) -> tuple[Scene, tuple[str, 
     Return the boxes round a wearer in his base frame, and the names of the parts that are lost.
 
     What no person can have is not believed (`plausible_posture`). Each part is a box turned as
-    its directions say, round its joints and its margins beyond them. Where joints that say a direction are in one place, it is a cube as wide as the longest bone of
-    an adult either way, which contains the part however it is turned.
+    its directions say, round its joints and its margins beyond them. Where
+    joints that say a direction are in one place, it is a cube as wide as the longest bone of an
+    adult either way, which contains the part however it is turned.
 
     Parameters
     ----------
