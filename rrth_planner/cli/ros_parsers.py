@@ -8,6 +8,7 @@ from pathlib import Path
 
 from rrth_planner.cli.numbers import integer, number
 from rrth_planner.cli.program import command_parser
+from rrth_planner.wearer.skeleton import STATURES
 
 # What `record` records: all topics of a planner and an arm, with their types.
 TOPICS = {
@@ -180,6 +181,14 @@ def wearer() -> argparse.ArgumentParser:
         default='cmu_bvh',
         metavar='NAME',
         help='what makes boxes of the points: one of config/skeletons, or a file (%(default)s)',
+    )
+    add(
+        '--stature',
+        type=number('m'),
+        nargs='+',
+        default=STATURES,
+        metavar='M',
+        help='of the person, or of the smallest and the largest one [m] (1.4 2.0)',
     )
     add(
         '--unit',

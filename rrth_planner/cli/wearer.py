@@ -44,7 +44,9 @@ def _publish(options: argparse.Namespace, given: Sequence[str]) -> None:
     )
     person = load_person(options.file, unit=options.unit, say=lambda words: say('wearer', words))
     person = excerpt(person, options.begin, options.end)
-    skeleton = load_skeleton(options.skeleton)
+    if len(options.stature) > 2:
+        raise OptionsError(f'--stature: {len(options.stature)} values, expected one or two [m]')
+    skeleton = load_skeleton(options.skeleton, (options.stature[0], options.stature[-1]))
     if options.form == 'boxes':
         # A skeleton of another tracker is named at once.
         try:
@@ -52,7 +54,17 @@ def _publish(options: argparse.Namespace, given: Sequence[str]) -> None:
         except SceneError as problem:
             raise OptionsError(f'--skeleton {options.skeleton}: {problem}') from problem
         if missing:
-            say('wearer', f'no {", ".join(missing)}: their points are not in the recording')
+            known = {point for joint in skeleton.joints for point in joint.points}
+            absent = known - set(person.names)
+            say(
+                'wearer',
+                f'no {", ".join(missing)}: '
+                + (
+                    f'points that are not in the recording: {", ".join(sorted(absent))}'
+                    if absent
+                    else 'not seen, or not believed, in the first frame'
+                ),
+            )
     signals: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         # Only stored: an Event that is waited for would be locked against its own handler.

@@ -91,6 +91,10 @@ def _from_csv(text: str) -> RecordedPerson:
     for column, name in enumerate(turned):
         begin = end + 4 * column
         quaternions = values[:, begin : begin + 4]
+        # One of no length is that of a point that its tracker had lost.
+        is_lost = (quaternions == 0.0).all(axis=1)
+        quaternions = np.where(is_lost[:, None], np.nan, quaternions)
+        values[is_lost, 1 + 3 * names.index(name) : 4 + 3 * names.index(name)] = np.nan
         lengths = np.linalg.norm(quaternions, axis=1)
         # A quaternion in part is none, and none is lost.
         is_known = np.isfinite(lengths) & (np.abs(lengths - 1.0) < 0.01)

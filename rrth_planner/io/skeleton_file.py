@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """How the points of a tracker become boxes, as a YAML file: docs/skeletons.md is its layout."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,8 @@ from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import SceneError, shown
 from rrth_planner.wearer.skeleton import (
     AXES,
+    BASE,
+    Bone,
     Direction,
     FrameBase,
     Joint,
@@ -21,9 +24,10 @@ from rrth_planner.wearer.skeleton import (
     Part,
     REST,
     Skeleton,
+    STATURES,
 )
 
-# The parts of an adult, which every skeleton begins with.
+# The parts and bones of an adult, which every skeleton begins with.
 PARTS_FILE = 'config/human.yaml'
 # What an entry `axes` of a skeleton may hold: where an axis of the wearer is in a frame.
 LETTERS = {
@@ -36,16 +40,24 @@ LETTERS = {
 LIMB = ('bone', 'radius', 'ends')
 SIDES = (('backward', 'forward'), ('right', 'left'), ('down', 'up'))
 BLOCK = ('around', *(side for pair in SIDES for side in pair))
+# The entries of a bone.
+BONE = ('ends', 'share')
 
 
-def load_skeleton(name_or_path: str | Path) -> Skeleton:
+def load_skeleton(name_or_path: str | Path, stature: Sequence[float] = STATURES) -> Skeleton:
     """
     Return a skeleton of `config/skeletons` by its name, or of a file whose name ends in `.yaml`.
+
+    Parameters
+    ----------
+    stature : sequence of 2 floats
+        Of the smallest and of the largest wearer [m]; by default of any adult.
 
     Raises
     ------
     ModelError, SceneError
-        There is no such skeleton, the file cannot be read, or it describes none.
+        There is no such skeleton, the file cannot be read, or it describes none; a stature
+        outside 0.5 to 2.8.
 
     """
     is_file = str(name_or_path).endswith('.yaml')
@@ -54,13 +66,16 @@ def load_skeleton(name_or_path: str | Path) -> Skeleton:
     parts_path = resource_path(PARTS_FILE)
     human = load_yaml(parts_path)
     with naming_file(parts_path, SceneError):
-        parts = mapping(human, 'parts of an adult', ('parts',), SceneError)['parts']
+        adult = mapping(human, 'an adult', ('parts', 'bones'), SceneError)
     data = load_yaml(path)
     with naming_file(path, SceneError):
-        return skeleton_from_mapping(data, parts)
+        skeleton = skeleton_from_mapping(data, adult['parts'], adult['bones'])
+    return replace(skeleton, stature=np.array(stature))
 
 
-def skeleton_from_mapping(data: Any, parts: Mapping[str, Any]) -> Skeleton:
+def skeleton_from_mapping(
+    data: Any, parts: Mapping[str, Any], bones: Mapping[str, Any] | None = None
+) -> Skeleton:
     """
     Return the skeleton that a mapping describes, laid out as the files in `config/skeletons`.
 
@@ -68,6 +83,8 @@ def skeleton_from_mapping(data: Any, parts: Mapping[str, Any]) -> Skeleton:
     ----------
     parts : mapping
         The parts that it begins with, by name, as in `config/human.yaml`.
+    bones : mapping, optional
+        The bones that it begins with, of which those between its joints count; by default none.
 
     Raises
     ------
@@ -75,7 +92,7 @@ def skeleton_from_mapping(data: Any, parts: Mapping[str, Any]) -> Skeleton:
         Something is missing, has another name, or describes no skeleton.
 
     """
-    optional = ('axes', 'parts', 'without', 'names_by_id')
+    optional = ('axes', 'parts', 'without', 'names_by_id', 'bones')
     given = mapping(data, 'skeleton', ('base', 'joints'), SceneError, optional)
     joints = _entries(given['joints'], 'joints')
     return Skeleton(
@@ -84,6 +101,7 @@ def skeleton_from_mapping(data: Any, parts: Mapping[str, Any]) -> Skeleton:
         base=_base(given['base']),
         axes=_axes(given.get('axes')),
         names_by_id=_names(given.get('names_by_id', []), 'names_by_id'),
+        bones=_bones(given, bones or {}, {BASE, *joints}),
     )
 
 
@@ -159,6 +177,23 @@ def _part(name: str, data: Any) -> Part:
         joints, margins = _names(entries['around'], f'{label}: around'), np.array(sides)
         axes = _directions(entries['axes'], label) if 'axes' in entries else ()
     return Part(name, joints, margins, axes, entries.get('rest', REST))
+
+
+def _bones(
+    given: Mapping[str, Any], human: Mapping[str, Any], joints: set[str]
+) -> tuple[Bone, ...]:
+    """Return the bones of an adult between joints of a skeleton, changed and added to."""
+    changed = _entries(given.get('bones', {}), 'bones')
+    bones = []
+    for name in dict.fromkeys([*human, *changed]):
+        label = f'bone "{name}"'
+        entry = mapping(changed.get(name, {}), label, (), SceneError, (*BONE, 'trunk'))
+        entry = mapping({**human.get(name, {}), **entry}, label, BONE, SceneError, ('trunk',))
+        start, end = _pair(entry['ends'], f'{label}: ends')
+        # An adult has joints that the skeleton lacks.
+        if {start, end} <= joints or name in changed:
+            bones.append(Bone(name, start, end, entry['share'], entry.get('trunk') is True))
+    return tuple(bones)
 
 
 def _directions(data: Any, label: str) -> tuple[Direction, ...]:

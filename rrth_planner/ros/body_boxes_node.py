@@ -12,15 +12,16 @@ from rclpy.time import Time
 from rrth_planner.model.errors import MessageError, SceneError
 from rrth_planner.ros.interface.posture_inputs import create_input
 from rrth_planner.ros.interface.tracker_parameters import declare_tracker_parameters
-from rrth_planner.ros.interface.tracker_reporter import TrackerReporter
+from rrth_planner.ros.interface.tracker_reporter import because, TrackerReporter
 from rrth_planner.ros.messages.body_source import TRACKER
 from rrth_planner.ros.messages.fields import NANOSECONDS
 from rrth_planner.ros.messages.part_markers import PartMarkers
 from rrth_planner.ros.messages.posture import TrackedPosture
 from rrth_planner.ros.middleware.executor import settle_interpreter, spin
 from rrth_planner.ros.middleware.node_process import run_node
-from rrth_planner.wearer.body_boxes import body_boxes
+from rrth_planner.wearer.body_boxes import boxes_of_plausible
 from rrth_planner.wearer.jump_filter import FilteredPosture, without_jumps
+from rrth_planner.wearer.plausible_posture import plausible_posture
 from visualization_msgs.msg import MarkerArray
 
 NAME = TRACKER
@@ -53,36 +54,43 @@ class BodyBoxesNode(Node):
                     f'header.stamp: {tracked.stamp / NANOSECONDS:g} s, expected a time since 1970'
                 )
             measured = tracked.stamp or self.get_clock().now().nanoseconds
-            msg, lost = self._boxes_of(tracked, measured)
+            msg, lost, doubts = self._boxes_of(tracked, measured)
         except (MessageError, SceneError) as problem:
             self._reporter.rejected(problem)
             return
         self._publisher.publish(msg)
-        self._reporter.published(measured, arrived, lost)
+        self._reporter.published(measured, arrived, lost, doubts)
 
     def _boxes_of(
         self, tracked: TrackedPosture, measured: int
-    ) -> tuple[MarkerArray, tuple[str, ...]]:
+    ) -> tuple[MarkerArray, tuple[str, ...], tuple[str, ...]]:
         """
-        Return the boxes of a posture, and the parts that are lost.
+        Return the boxes of a posture, the parts that are lost, and what of it is not believed.
 
         measured: its stamp; without one, the time of its reception [ns].
         """
         settings = self._settings
+        # First of all: what is not believed is lost, and jumps neither there nor back.
+        plausible = plausible_posture(settings.skeleton, tracked.posture)
         self._before = without_jumps(
-            self._before, tracked.posture, measured / NANOSECONDS, settings.max_jump
+            self._before, plausible.posture, measured / NANOSECONDS, settings.max_jump
         )
         self._reporter.jumped(self._before.n_held)
-        scene, lost = body_boxes(settings.skeleton, self._before.posture)
+        scene, lost = boxes_of_plausible(settings.skeleton, self._before.posture)
         if not scene.boxes:
             raise SceneError(
                 'all parts of the wearer are lost, expected the points of at least one'
+                f'{because(plausible.doubts)}'
             )
         # A tracker that reports in the base frame has its own name for it.
         own = tracked.frame if settings.skeleton.base is None else ''
         # One that is not set is handed on as such: whoever receives it adds the tracker's latency.
         stamp = Time(nanoseconds=tracked.stamp).to_msg()
-        return self._markers.message(scene, own or settings.base_frame, stamp), lost
+        return (
+            self._markers.message(scene, own or settings.base_frame, stamp),
+            lost,
+            plausible.doubts,
+        )
 
 
 def _run(node: BodyBoxesNode) -> None:

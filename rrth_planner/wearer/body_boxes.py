@@ -8,8 +8,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 from rrth_planner.model.arrays import Array
-from rrth_planner.model.errors import SceneError
+from rrth_planner.model.errors import SceneError, shown
 from rrth_planner.model.scene import Box, Scene
+from rrth_planner.wearer.joint_positions import FARTHEST_POINT, Indices, joint_positions, padded
+from rrth_planner.wearer.plausible_posture import plausible_posture
 from rrth_planner.wearer.posture import Posture
 from rrth_planner.wearer.skeleton import (
     AXES,
@@ -17,16 +19,11 @@ from rrth_planner.wearer.skeleton import (
     Direction,
     FrameBase,
     JointBase,
-    LONGEST,
     Skeleton,
 )
 
-Indices = NDArray[np.intp]
-
 # Of `Box.numbers`, (15,).
 CENTER, SIZE, ROTATION = slice(0, 3), slice(3, 6), slice(6, 15)
-# A point further from the tracker's origin is lost [m].
-FARTHEST_POINT = 1e3
 # Joints closer than this say no direction: a tracker has mixed them up [m].
 CLOSEST = 0.01
 # No joint of an adult is further from the next one: more than the longest thigh [m].
@@ -44,11 +41,6 @@ class _Layout:
     axes. Shorter lists repeat their first entry.
     """
 
-    points: Indices
-    weights: Array
-    offset_joints: Indices
-    offset_points: Indices
-    offsets: Array
     base_point: int
     base_origin: int
     base_ends: Indices
@@ -69,9 +61,10 @@ def body_boxes(skeleton: Skeleton, posture: Posture) -> tuple[Scene, tuple[str, 
     """
     Return the boxes round a wearer in his base frame, and the names of the parts that are lost.
 
-    Each part is a box turned as its directions say, round its joints and its margins beyond them.
-    Where joints that say a direction are in one place, it is a cube as wide as the longest bone of
-    an adult either way, which contains the part however it is turned.
+    What no person can have is not believed (`plausible_posture`). Each part is a box turned as
+    its directions say, round its joints and its margins beyond them. Where
+    joints that say a direction are in one place, it is a cube as wide as the longest bone of an
+    adult either way, which contains the part however it is turned.
 
     Parameters
     ----------
@@ -83,15 +76,20 @@ def body_boxes(skeleton: Skeleton, posture: Posture) -> tuple[Scene, tuple[str, 
     Scene
         A box for each part of which all joints are seen, in the order of the skeleton.
     tuple of str
-        The parts of which a point is lost, missing, or further than 1 km from the origin.
+        The parts of which a point is lost, missing, or not believed.
 
     Raises
     ------
     SceneError
-        The points or the frame of the base are lost.
+        The points or the frame of the base are lost, or it is no person.
 
     """
-    layout, joints = _joints(skeleton, posture)
+    return boxes_of_plausible(skeleton, plausible_posture(skeleton, posture).posture)
+
+
+def boxes_of_plausible(skeleton: Skeleton, posture: Posture) -> tuple[Scene, tuple[str, ...]]:
+    """Return the same as `body_boxes` of a posture that was judged before, and filtered since."""
+    layout, joints = _layout(skeleton, posture.names), joint_positions(skeleton, posture)
     rotation, origin = _base(skeleton, layout, joints, posture)
     in_base = np.empty((len(joints) + 4, 3))
     np.matmul(joints - origin, rotation, out=in_base[:-4])
@@ -118,28 +116,11 @@ def base_pose(skeleton: Skeleton, posture: Posture) -> Array:
         The points or the frame of the base are lost.
 
     """
-    layout, joints = _joints(skeleton, posture)
+    posture = plausible_posture(skeleton, posture).posture
+    layout, joints = _layout(skeleton, posture.names), joint_positions(skeleton, posture)
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = _base(skeleton, layout, joints, posture)
     return T
-
-
-def _joints(skeleton: Skeleton, posture: Posture) -> tuple[_Layout, Array]:
-    """Return the joints of a posture, (n, 3), NaN where lost."""
-    layout = _layout(skeleton, posture.names)
-    points = np.empty((len(posture.names) + 1, 3))
-    points[:-1] = posture.positions
-    points[-1] = np.nan
-    points[~(np.abs(points) <= FARTHEST_POINT)] = np.nan
-    joints: Array = (points[layout.points] * layout.weights).sum(axis=1)
-    if layout.offset_joints.size:
-        if posture.rotations is None or not posture.names:
-            joints[layout.offset_joints] = np.nan
-        else:
-            turned = posture.rotations[layout.offset_points] @ layout.offsets
-            turned[~(np.abs(turned) <= LONGEST * 2)] = np.nan
-            joints[layout.offset_joints] += turned[:, :, 0]
-    return layout, joints
 
 
 def _base(
@@ -164,6 +145,16 @@ def _base(
     rotation = rows[0].T
     origin = at + rotation @ base.offset
     if not is_clear[0] or not np.abs(origin).max() <= FARTHEST_POINT:
+        wanted = (
+            dict.fromkeys([base.origin, *(j for d in base.axes for j in (d.start, d.end))])
+            if isinstance(base, JointBase)
+            else {}
+        )
+        points = [p for j in skeleton.joints if j.name in wanted for p in j.points]
+        if absent := [point for point in points if point not in posture.names]:
+            raise SceneError(
+                f'base: no point "{absent[0]}" among {shown(list(posture.names))}, expected one'
+            )
         raise SceneError(f'base: "{name}" or a joint of its axes is lost, expected all of them')
     return rotation, origin
 
@@ -227,15 +218,6 @@ def _layout(skeleton: Skeleton, names: tuple[str, ...]) -> _Layout:
     n = len(skeleton.joints)
     row = {joint.name: k for k, joint in enumerate(skeleton.joints)}
     row |= {BASE: n, **{axis: n + 1 + k for k, axis in enumerate(AXES)}}
-    points = _padded([[place.get(p, len(names)) for p in j.points] for j in skeleton.joints])
-    weights = np.zeros(points.shape)
-    for weight, joint in zip(weights, skeleton.joints, strict=True):
-        weight[: len(joint.points)] = 1.0 / len(joint.points)
-    # Frames that are missing have no place: their joints are lost by their positions.
-    placed = [(k, j.offset) for k, j in enumerate(skeleton.joints) if j.offset is not None]
-    with_offset = [k for k, _ in placed]
-    offset_points = points[with_offset, 0] if with_offset else np.zeros(0, dtype=np.intp)
-    offsets = [skeleton.axes @ offset for _, offset in placed]
     base = skeleton.base
     base_axes = base.axes if isinstance(base, JointBase) else BASE_AXES
     base_order, base_signs = _ordered([base_axes])
@@ -248,17 +230,12 @@ def _layout(skeleton: Skeleton, names: tuple[str, ...]) -> _Layout:
     sides = [np.cross(rest, np.eye(3)[np.abs(rest).argmin()]) for rest in rests]
     margins = np.array([part.margins for part in skeleton.parts])
     return _Layout(
-        points=points,
-        weights=weights[:, :, None],
-        offset_joints=np.array(with_offset, dtype=np.intp),
-        offset_points=np.minimum(offset_points, len(names) - 1),
-        offsets=np.array(offsets).reshape(-1, 3, 1),
         base_point=place.get(base.frame, len(names)) if isinstance(base, FrameBase) else 0,
         base_origin=row[base.origin] if isinstance(base, JointBase) else 0,
         base_ends=np.array([[row[d.start], row[d.end]] for d in base_axes]),
         base_order=base_order,
         base_signs=base_signs,
-        part_joints=_padded([[row[name] for name in part.joints] for part in skeleton.parts]),
+        part_joints=padded([[row[name] for name in part.joints] for part in skeleton.parts]),
         ends=np.array(ends),
         is_limb=np.array([len(axes) == 1 for axes in kinds]),
         rests=rests,
@@ -268,13 +245,6 @@ def _layout(skeleton: Skeleton, names: tuple[str, ...]) -> _Layout:
         margins=margins,
         reaches=LONGEST_BONE + np.sqrt((margins.max(axis=2) ** 2).sum(axis=1)),
     )
-
-
-def _padded(lists: list[list[int]]) -> Indices:
-    """Return lists of indices as rows, (n, longest), the shorter ones ended by their first."""
-    longest = max(map(len, lists), default=1)
-    padded = [[*row, *row[:1] * (longest - len(row))] for row in lists]
-    return np.array(padded, dtype=np.intp).reshape(len(lists), longest)
 
 
 def _ordered(kinds: list[tuple[Direction, ...]]) -> tuple[Indices, Array]:

@@ -23,6 +23,11 @@ ORTHOGONAL = 1e-6
 REST = (1.0, 0.0, -1.0)
 # Nothing on a wearer is longer [m].
 LONGEST = 5.0
+# Of the smallest and the largest adult of ANSUR II, 1.409 and 1.993, rounded away from each
+# other [m].
+STATURES = (1.4, 2.0)
+# What may be said of a wearer [m].
+LEAST_STATURE, MOST_STATURE = 0.5, 2.8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -143,6 +148,46 @@ class Part:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Bone:
+    """
+    What a person has between two joints, by which a posture is judged.
+
+    Parameters
+    ----------
+    start, end : str
+        Joints, or `base`; the end is further from the trunk.
+    shares : array_like, shape (2,)
+        Its least and its greatest length over the stature of whom it belongs to [-].
+    is_trunk : bool
+        Whether both ends belong to the trunk.
+
+    Raises
+    ------
+    SceneError
+        The same joint twice, or shares that are none, 0 to 1 in their order.
+
+    """
+
+    name: str
+    start: str
+    end: str
+    shares: Array
+    is_trunk: bool = False
+
+    def __post_init__(self) -> None:
+        """Validate and freeze."""
+        label = f'bone "{printable(self.name, "name of a bone", SceneError)}"'
+        if self.start == self.end:
+            raise SceneError(f'{label}: from "{self.start}" to itself, expected two joints')
+        _freeze(self, 'shares', (2,), f'{label}: share', '-')
+        if not 0.0 <= self.shares[0] < self.shares[1] <= 1.0:
+            raise SceneError(
+                f'{label}: share {self.shares.tolist()}, expected the least and the greatest of '
+                'the stature, 0 to 1 [-]'
+            )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class FrameBase:
     """
     The base frame of a wearer whose chest is a frame of the tracker.
@@ -219,12 +264,16 @@ class Skeleton:
         each of these frames, as columns.
     names_by_id : tuple of str
         What the tracker calls the points that it reports by number only.
+    bones : tuple of Bone
+        None: whatever the lengths between joints are, they are believed.
+    stature : array_like, shape (2,)
+        Of the smallest and the largest wearer whom the bones may belong to, 0.5 to 2.8 [m].
 
     Raises
     ------
     SceneError
-        A joint or part that comes twice, a part or base of a joint that is none, a joint that
-        nothing uses, axes that are no rotation.
+        A joint, part or bone that comes twice, a part, bone or base of a joint that is none, a
+        joint that nothing uses, axes that are no rotation, statures that are none.
 
     """
 
@@ -233,10 +282,18 @@ class Skeleton:
     base: FrameBase | JointBase | None
     axes: Array
     names_by_id: tuple[str, ...] = ()
+    bones: tuple[Bone, ...] = ()
+    stature: Array = field(default_factory=lambda: np.array(STATURES))
 
     def __post_init__(self) -> None:
         """Validate and freeze."""
         _freeze(self, 'axes', (3, 3), 'axes', '-')
+        _freeze(self, 'stature', (2,), 'stature')
+        if not LEAST_STATURE <= self.stature[0] <= self.stature[1] <= MOST_STATURE:
+            raise SceneError(
+                f'stature: {self.stature.tolist()}, expected that of the smallest and of the '
+                f'largest wearer, {LEAST_STATURE:g} to {MOST_STATURE:g} [m]'
+            )
         if np.abs(self.axes @ self.axes.T - np.eye(3)).max() > ORTHOGONAL or (
             np.linalg.det(self.axes) < 0.0
         ):
@@ -247,6 +304,7 @@ class Skeleton:
         _check_once([BASE, *AXES, *names], 'joint')
         _check_once([part.name for part in self.parts], 'part')
         _check_once(list(self.names_by_id), 'name of an id')
+        _check_once([bone.name for bone in self.bones], 'bone')
         if not self.parts:
             raise SceneError('parts: none, expected at least one')
         uses = {f'part "{part.name}"': _joints_of(part) for part in self.parts}
@@ -256,6 +314,11 @@ class Skeleton:
             known = {*names, BASE} if user != 'base' else {*names}
             if missing := sorted(used - known):
                 raise SceneError(f'{user}: no joint "{missing[0]}", expected it among the joints')
+        for bone in self.bones:
+            if missing := sorted({bone.start, bone.end} - {*names, BASE}):
+                raise SceneError(
+                    f'bone "{bone.name}": no joint "{missing[0]}", expected it among the joints'
+                )
         if unused := [name for name in names if name not in set().union(*uses.values())]:
             raise SceneError(
                 f'joint "{unused[0]}": used by no part and not by the base, expected one of '

@@ -329,7 +329,7 @@ def test_a_stamp_that_is_no_time_is_rejected_and_forgotten(start, stamp):
     tracker.publishers_of['poses'].publish(msg)
     tracker.wait_for_rejection(r'header\.stamp: .* s, expected a time since 1970')
     # The next jump is still held back.
-    far = moved(posture, 'LeftHand', 0.5)
+    far = replace(posture, positions=posture.positions + 0.5)
     expect(tracker.hear(far, NOW + STEP), tracker.skeleton, posture)
 
 
@@ -360,14 +360,71 @@ def test_a_part_that_is_lost_is_left_out_and_named_once(start):
 def test_a_jump_is_held_back_once_and_counted(start):
     tracker = start('azure_kinect', 'markers')
     posture = person_of('azure_kinect')
-    jumped = moved(posture, 'WRIST_LEFT', [0.0, 0.0, 0.6])
+    jumped = replace(posture, positions=posture.positions + [0.0, 0.0, 0.6])
     expect(tracker.hear(posture, NOW), tracker.skeleton, posture)
     expect(tracker.hear(jumped, NOW + STEP), tracker.skeleton, posture)
     expect(tracker.hear(jumped, NOW + 2 * STEP), tracker.skeleton, jumped)
-    wait_until(lambda: tracker.figures.get('jumps held back') == '1')
+    n = str(len(posture.names))
+    wait_until(lambda: tracker.figures.get('jumps held back') == n)
     # After a gap it may be anywhere.
     late = NOW + 2 * STEP + 300_000_000
     expect(tracker.hear(posture, late), tracker.skeleton, posture)
+
+
+def test_a_point_at_0_0_0_is_lost_named_once_and_jumps_neither_there_nor_back(start):
+    tracker = start('azure_kinect', 'markers')
+    posture = person_of('azure_kinect')
+    posture = replace(posture, positions=posture.positions + 2.0)
+    zero = posture.positions.copy()
+    zero[[posture.names.index(name) for name in ('WRIST_LEFT', 'HAND_LEFT')]] = 0.0
+    zero = replace(posture, positions=zero)
+    expect(tracker.hear(posture, NOW), tracker.skeleton, posture)
+    for k in range(1, 4):
+        lost = expect(tracker.hear(zero, NOW + k * STEP), tracker.skeleton, zero)
+        assert lost == ('left forearm', 'left hand')
+    assert not expect(tracker.hear(posture, NOW + 4 * STEP), tracker.skeleton, posture)
+    named = [line for line in tracker.logs if 'left hand' in line]
+    assert named == [
+        'markers: no points of left forearm, left hand: left out until all are seen '
+        '("WRIST_LEFT", "HAND_LEFT" at exactly 0 0 0)'
+    ]
+    wait_until(lambda: tracker.figures.get('frames published') == '5')
+    assert tracker.figures['jumps held back'] == '0'
+
+
+@pytest.mark.parametrize(('name', 'source'), [('azure_kinect', 'markers'), ('xsens', 'poses')])
+def test_a_person_in_millimetres_is_rejected_with_the_unit(name, source, start):
+    tracker = start(name, source)
+    posture = person_of(name)
+    tracker.send(replace(posture, positions=1000.0 * posture.positions), NOW)
+    tracker.wait_for_rejection('m away, expected metres: are the positions in mm')
+    assert not tracker.boxes
+
+
+def test_a_rigid_body_whose_quaternion_has_no_length_is_lost(start):
+    tracker = start('xsens', 'bodies')
+    posture = person_of('xsens')
+    expect(tracker.hear(posture, NOW), tracker.skeleton, posture)
+    rotations = posture.rotations.copy()
+    k = posture.names.index('LeftHand')
+    for others in (False, True):
+        chosen = [i for i in range(len(posture.names)) if (i != k) == others]
+        part = replace(
+            posture,
+            names=tuple(posture.names[i] for i in chosen),
+            positions=posture.positions[chosen],
+            rotations=rotations[chosen],
+        )
+        if others:
+            tracker.send(part, NOW + STEP)
+        else:
+            pose = PoseStamped()
+            pose.header.frame_id, pose.header.stamp = 'camera', stamp_of(NOW + STEP)
+            pose.pose.orientation.w = 0.0
+            tracker.publishers_of['LeftHand'].publish(pose)
+    seen = {marker.ns for marker in tracker.wait_for(NOW + STEP).markers}
+    parts = {part.name for part in tracker.skeleton.parts}
+    assert parts - seen == {'left forearm', 'left hand'}
 
 
 def test_without_the_base_frame_nothing_is_published(start):
@@ -608,7 +665,7 @@ def test_no_error_ends_the_node(start, monkeypatch):
 
     posture = person_of('azure_kinect')
     with monkeypatch.context() as patch:
-        patch.setattr(body_boxes_node, 'body_boxes', fail)
+        patch.setattr(body_boxes_node, 'boxes_of_plausible', fail)
         tracker.send(posture, NOW)
         wait_until(lambda: tracker.node._reporter._n_received == 1)
     expect(tracker.hear(posture, NOW + STEP), tracker.skeleton, posture)

@@ -10,7 +10,7 @@ from rrth_planner.io.skeleton_file import load_skeleton
 from rrth_planner.model.errors import OptionsError
 from rrth_planner.ros.messages.posture import ONLY
 from rrth_planner.ros.middleware.parameter_declaration import declare, reject_unknown, Setting
-from rrth_planner.wearer.skeleton import Skeleton
+from rrth_planner.wearer.skeleton import Skeleton, STATURES
 
 # What a tracker publishes, and which of these have numbers in place of names.
 INPUTS = ('markers', 'poses', 'bodies', 'joint_states', 'tf')
@@ -28,6 +28,7 @@ SETTINGS = (
     _fixed('rate', 120.0, 'Hz', 'how often TF is looked up', 1.0, 1000.0),
     _fixed('base_frame', 'torso', 'frame id', 'frame of the boxes'),
     _fixed('lifetime', 0.2, 's', 'a part that is not seen for so long is lost', 0.001, 60.0),
+    _fixed('stature', list(STATURES), 'm', 'of the smallest and the largest wearer', 0.5, 2.8),
     _fixed('max_jump', 0.3, 'm', 'a point that moves further is held back', 0.01, 100.0),
 )
 
@@ -65,7 +66,10 @@ def declare_tracker_parameters(node: Node) -> TrackerParameters:
         raise OptionsError('base_frame: empty, expected the name of the frame of the boxes')
     if NAME not in values['pose_topic']:
         raise OptionsError(f'pose_topic: "{values["pose_topic"]}", expected a name with {NAME}')
-    skeleton = load_skeleton(values['skeleton'])
+    stature = values.pop('stature')
+    if len(stature) not in (1, 2):
+        raise OptionsError(f'stature: {len(stature)} values, expected one or two [m]')
+    skeleton = load_skeleton(values['skeleton'], (stature[0], stature[-1]))
     if values['input'] in NUMBERED and not skeleton.names_by_id:
         raise OptionsError(
             f'input: {values["input"]}, which have no names; expected a skeleton with '

@@ -16,6 +16,11 @@ from rrth_planner.ros.messages.fields import NANOSECONDS
 PERIOD, WARNING_PERIOD = 1.0, 5.0
 
 
+def because(doubts: tuple[str, ...]) -> str:
+    """Return the end of a sentence that says what is not believed; empty where all is."""
+    return f' ({"; ".join(doubts)})' if doubts else ''
+
+
 class TrackerReporter:
     """
     Publish `/diagnostics` every second, and log rejections and lost parts.
@@ -61,8 +66,14 @@ class TrackerReporter:
             f'{self._source} rejected: {problem}', throttle_duration_sec=WARNING_PERIOD
         )
 
-    def published(self, measured: int, arrived: int, lost: tuple[str, ...]) -> None:
-        """Count a body: when it was measured and had arrived [ns], and which parts it lacks."""
+    def published(
+        self, measured: int, arrived: int, lost: tuple[str, ...], doubts: tuple[str, ...]
+    ) -> None:
+        """
+        Count a body: when it was measured and had arrived [ns], and which parts it lacks.
+
+        doubts: what the tracker said and is not believed.
+        """
         if self._n_published == 0:
             self._node.get_logger().info(f'{self._source}: the first body is published')
         self._n_published += 1
@@ -75,6 +86,7 @@ class TrackerReporter:
             self._named.update(new)
             self._node.get_logger().warning(
                 f'{self._source}: no points of {", ".join(new)}: left out until all are seen'
+                f'{because(doubts)}'
             )
 
     def _age(self) -> float:

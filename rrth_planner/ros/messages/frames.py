@@ -75,6 +75,8 @@ class Frames:
                 f'"{self._base_frame}": {problem}'
             ) from problem
         t, r = stamped.transform.translation, stamped.transform.rotation
+        if not (r.x or r.y or r.z or r.w):
+            raise FrameError(f'frame "{frame}": a quaternion of length 0, expected 1 [-]')
         return pose_matrix((t.x, t.y, t.z), (r.x, r.y, r.z, r.w))
 
     def newest(self, frame: str) -> int:

@@ -92,8 +92,10 @@ def posture_from_markers(
     stamps = [nanoseconds_of(marker.header.stamp) for marker in markers.values()]
     positions = np.full((len(names), 3), math.nan)
     for joint, marker in markers.items():
-        p = marker.pose.position
-        positions[joint] = p.x, p.y, p.z
+        p, o = marker.pose.position, marker.pose.orientation
+        # A quaternion of no length is that of a point that its tracker has lost.
+        if o.x or o.y or o.z or o.w:
+            positions[joint] = p.x, p.y, p.z
     return TrackedPosture(
         Posture(names=tuple(names), positions=positions),
         min(filter(None, stamps), default=0),
@@ -108,7 +110,8 @@ def posture_from_poses(msg: PoseArray, names: Sequence[str]) -> TrackedPosture:
     Raises
     ------
     MessageError
-        Another number of poses, or a quaternion of another length than 1. What is NaN is lost.
+        Another number of poses, or a quaternion of another length than 1. What is NaN is
+        lost, or has a quaternion of length 0.
 
     """
     if len(msg.poses) != len(names):
@@ -122,7 +125,10 @@ def posture_from_poses(msg: PoseArray, names: Sequence[str]) -> TrackedPosture:
 def posture_of_poses(poses: Mapping[str, Any], names: Sequence[str]) -> Posture:
     """Return geometry_msgs/Pose by name as a posture; raise MessageError of a bad quaternion."""
     numbers = np.array([_numbers(poses[name]) if name in poses else LOST for name in names])
-    positions, quaternions = np.ascontiguousarray(numbers[:, :3]), numbers[:, 3:]
+    quaternions = numbers[:, 3:]
+    # One of no length is that of a point that its tracker has lost.
+    numbers[~quaternions.any(axis=1)] = math.nan
+    positions = np.ascontiguousarray(numbers[:, :3])
     lengths = np.sqrt(np.einsum('ij,ij->i', quaternions, quaternions))
     is_bad = np.abs(lengths - 1.0) > QUATERNION_TOLERANCE
     if is_bad.any():
