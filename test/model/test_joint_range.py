@@ -37,10 +37,10 @@ def test_goals_keep_inside_the_limits_and_starts_may_be_a_little_outside():
     low, high = arm.bounds
     np.testing.assert_allclose(goal_bounds(arm)[0] - low, [0.005, 0.0005, 0.005, 0.002])
     np.testing.assert_allclose(high - goal_bounds(arm)[1], [0.005, 0.0005, 0.005, 0.002])
-    np.testing.assert_allclose(low - start_bounds(arm)[0], [0.05, 0.005, 0.0, 0.05])
-    np.testing.assert_allclose(start_bounds(arm)[1] - high, [0.05, 0.005, 0.0, 0.05])
-    q = np.array([low[0] - 0.05, 0.204, high[2] + 0.01, 1.1])
-    expected = np.array([[q[0], *low[1:]], [high[0], 0.204, *high[2:]]])
+    np.testing.assert_allclose(low - start_bounds(arm)[0], [0.05, 0.005, 2.0 * np.pi, 0.05])
+    np.testing.assert_allclose(start_bounds(arm)[1] - high, [0.05, 0.005, 2.0 * np.pi, 0.05])
+    q = np.array([low[0] - 0.05, 0.204, high[2] + 6.0, 1.1])
+    expected = np.array([[q[0], *low[1:]], [high[0], 0.204, q[2], high[3]]])
     np.testing.assert_array_equal(bounds_from(arm, q), expected)
     assert joints_beyond(arm, q).tolist() == [0, 1, 2, 3]
     assert joints_beyond(arm, np.clip(q, low - 1e-7, high + 1e-7)).tolist() == []
