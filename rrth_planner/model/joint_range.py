@@ -52,7 +52,7 @@ def start_bounds(arm: ArmModel) -> Array:
     return _frozen(arm.bounds[0] - beyond, arm.bounds[1] + beyond)
 
 
-def turns_near(arm: ArmModel, bounds: Array, q: Array, n_turns: int) -> Array:
+def turns_near(arm: ArmModel, bounds: Array, q: Array, n_turns: float) -> Array:
     """
     Return bounds in which continuous joints have a few turns only, those nearest to q.
 
@@ -62,8 +62,8 @@ def turns_near(arm: ArmModel, bounds: Array, q: Array, n_turns: int) -> Array:
         Least and greatest joint positions [rad or m].
     q : ndarray, shape (dof,)
         In the middle of the turns where the bounds allow it [rad or m].
-    n_turns : int
-        1: bounds that contain each pose of the links once.
+    n_turns : float
+        > 0; 1: bounds that contain each pose of the links once.
 
     Returns
     -------

@@ -22,9 +22,9 @@ from rrth_planner.planning.problem import PlanningProblem
 
 # Samples of the joints: few are enough mostly; many before all are reported as not free.
 FEW, MANY = 176, 4096
-# At least so many for an arm with joints that turn freely: without their limits more goals are
-# near, and the nearest one is missed more often.
-FEW_TURNING = 4 * FEW
+# Shares of a turn round q_near from which joints that turn freely are drawn, too, since few of the
+# draws from a whole turn are near.
+SHARES = (0.5, 0.25)
 # Most goals that are kept, and most configurations in collision.
 MOST, MOST_BLOCKED = 256, 512
 # Goals with a continuous joint the other way round that are kept, at most.
@@ -158,17 +158,30 @@ def goal_configurations(
     q_near : ndarray, shape (dof,)
         [rad].
     n_draws : int
-        Half of the number of candidates, which are more where joints turn freely.
+        Half of the number of candidates, of which there are more where joints turn freely.
 
     """
+    check_dof(q_near, arm.dof, 'q_near')
+    check_dof(world.bounds, arm.dof, 'world')
+    bounds = turns_near(arm, world.bounds, q_near, 1.0)
+    found = _goals_within(arm, goal, world, bounds, q_near, n_draws)
+    if bounds is world.bounds:
+        return found
+    for share in SHARES:
+        near = turns_near(arm, world.bounds, q_near, share)
+        other = _goals_within(arm, goal, world, near, q_near, 2 * FEW)
+        if _straight_distance(other, q_near) < _straight_distance(found, q_near):
+            found = other
+    return _with_other_turns(arm, world, q_near, found)
+
+
+def _goals_within(
+    arm: ArmModel, goal: PointingGoal, world: World, bounds: Array, q_near: Array, n_draws: int
+) -> GoalSet:
+    """Return what `goal_configurations` does, within bounds, (2, dof) [rad or m]."""
     kernels, dof = pointing_kernels(arm), arm.dof
-    check_dof(q_near, dof, 'q_near')
-    check_dof(world.bounds, dof, 'world')
     goals, blocked = np.empty((MOST, dof)), np.empty((MOST_BLOCKED, dof))
     blocked_reaches = np.empty(MOST_BLOCKED)
-    bounds = turns_near(arm, world.bounds, q_near, 1)
-    if bounds is not world.bounds:
-        n_draws = max(n_draws, FEW_TURNING)
     n_free, n_blocked, is_straight = find_goals(
         world.functions,
         jit.address(kernels.goal_candidates),
@@ -185,20 +198,26 @@ def goal_configurations(
         blocked_reaches,
     )
     n_kept = min(n_blocked, MOST_BLOCKED)
-    found = GoalSet(
+    return GoalSet(
         q_goals=goals[:n_free],
         n_bent=n_free - is_straight,
         n_aiming=n_free + n_blocked,
         q_blocked=blocked[:n_kept],
         blocked_reaches=blocked_reaches[:n_kept],
     )
-    return found if bounds is world.bounds else _with_other_turns(arm, world, q_near, found)
+
+
+def _straight_distance(goals: GoalSet, q_near: Array) -> float:
+    """Return how far the goal with a straight free edge is, or infinity [rad]."""
+    if goals.n_bent == len(goals.q_goals):
+        return math.inf
+    return float(np.linalg.norm(goals.q_goals[-1] - q_near))
 
 
 def _with_other_turns(arm: ArmModel, world: World, q_near: Array, found: GoalSet) -> GoalSet:
     """Return goals and their like with one continuous joint the other way round."""
     q_goals = found.q_goals
-    low, high = turns_near(arm, world.bounds, q_near, 2)
+    low, high = turns_near(arm, world.bounds, q_near, 2.0)
     turned = [q_goals]
     for k in np.flatnonzero(arm.is_continuous):
         others = q_goals.copy()
@@ -246,7 +265,7 @@ def pointing_problem(
         goals = goal_configurations(arm, goal, world, q_start, FEW)
         if len(goals.q_goals) == 0:
             goals = goal_configurations(arm, goal, world, q_start, MANY)
-    bounds = turns_near(arm, world.bounds, q_start, 2)
+    bounds = turns_near(arm, world.bounds, q_start, 2.0)
     if bounds is not world.bounds and len(goals.q_goals) > 0:
         low, high = goals.q_goals.min(axis=0), goals.q_goals.max(axis=0)
         bounds = np.array([np.minimum(bounds[0], low), np.maximum(bounds[1], high)])

@@ -89,7 +89,9 @@ def pan_tilt(max_turns=TURNS, radius=0.0):
     return ArmModel(
         joint_names=('pan', 'tilt'),
         is_prismatic=(False, False),
-        dh=np.array([[0.0, 0.0, 0.0, 0.1], [QUARTER, 0.0, QUARTER, 0.0], [QUARTER, 0.1, 0.0, 0.0]]),
+        dh=np.array(
+            [[0.0, 0.0, 0.0, 0.1], [QUARTER, 0.0, QUARTER, 0.0], [QUARTER, 0.1, 0.0, 0.0]]
+        ),
         bounds=np.array([[-TURN * max_turns, -0.4], [TURN * max_turns, 0.4]]),
         radii=np.full(3, radius),
         T_base_mount=np.eye(4),
@@ -145,9 +147,7 @@ def assert_good(arm, scene, plan, q_start, target):
     world = arm_world(arm, scene, MARGIN, RAY)
     assert certify(motion, world, plan.escape_time).is_proven
     reach = float(np.linalg.norm(target - tool_pose(arm, motion.positions[-1])[:3, 3]))
-    assert (
-        violation_seen(arm, scene, motion, MARGIN, RAY, reach, plan.escape_time, 'fcl') is None
-    )
+    assert violation_seen(arm, scene, motion, MARGIN, RAY, reach, plan.escape_time, 'fcl') is None
     if plan.escape_time == 0.0:
         limits = load_settings(arm.dof).limits
         inspect_motion(

@@ -139,9 +139,7 @@ class RecordingReader:
             if not has_joint_of(recorded.msg, names):
                 return None
             received = recorded.received / NANOSECONDS
-            before = joint_reading(
-                recorded.msg, names, received, before, self._arm.is_continuous
-            )
+            before = joint_reading(recorded.msg, names, received, before, self._arm.is_continuous)
             return before
 
         return [reading for reading in self._good('joint_states', read) if reading is not None]
