@@ -74,8 +74,8 @@ READ_URDF_EPILOG = """\
 The conversion is exact for any chain of revolute, continuous, prismatic and fixed joints. The
 result is compared with the URDF at many configurations, and the difference is printed. Continuous
 joints turn without a stop, as often as --max-turns allows. Links beside the chain belong to the
-arm where they are fixed to it; those that joints beside it move, such as fingers, are left out and named, or enclosed in all their
-positions. Every triangle of a mesh is proven to lie in the capsules. Parts that collide
+arm where they are fixed to it; those that joints beside it move, such as fingers, are left out
+and named, or enclosed in all their positions. Every triangle of a mesh is proven to lie in the capsules. Parts that collide
 in the middle of the joint ranges and nearly everywhere are written as pairs that may meet.
 
 exit codes: 0  the file has been written

@@ -228,8 +228,8 @@ def _with_other_turns(arm: ArmModel, world: World, q_near: Array, found: GoalSet
     # No path to a goal beyond the one with a straight edge is shorter.
     longest = distances[n_near - 1] if found.n_bent < n_near else np.inf
     order = np.argsort(distances, kind='stable')
-    others = [i for i in order[distances[order] < longest] if i >= n_near][:MOST_TURNED]
-    kept = sorted([*range(n_near), *others], key=distances.__getitem__)[:MOST]
+    further = [i for i in order[distances[order] < longest] if i >= n_near][:MOST_TURNED]
+    kept = sorted([*range(n_near), *further], key=distances.__getitem__)[:MOST]
     for n, i in enumerate(kept):
         if i >= n_near and world.is_edge_valid(q_near, goals[i]):
             return replace(found, q_goals=goals[kept[: n + 1]], n_bent=n)
