@@ -75,8 +75,9 @@ The conversion is exact for any chain of revolute, continuous, prismatic and fix
 result is compared with the URDF at many configurations, and the difference is printed. Continuous
 joints turn without a stop, as often as --max-turns allows. Links beside the chain belong to the
 arm where they are fixed to it; those that joints beside it move, such as fingers, are left out
-and named, or enclosed in all their positions. Every triangle of a mesh is proven to lie in the capsules. Parts that collide
-in the middle of the joint ranges and nearly everywhere are written as pairs that may meet.
+and named, or enclosed in all their positions. Every triangle of a mesh is proven to lie in the
+capsules. Parts that collide in the middle of the joint ranges and nearly everywhere are written as
+pairs that may meet.
 
 exit codes: 0  the file has been written
             2  wrong usage, or a URDF without such a chain (the reason is printed)
