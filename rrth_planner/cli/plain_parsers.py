@@ -73,10 +73,11 @@ the radius given here.
 READ_URDF_EPILOG = """\
 The conversion is exact for any chain of revolute, continuous, prismatic and fixed joints. The
 result is compared with the URDF at many configurations, and the difference is printed. Continuous
-joints get limits of +-pi. Links beside the chain belong to the arm where they are fixed to it;
-those that joints beside it move, such as fingers, are left out and named, or enclosed in all their
-positions. Every triangle of a mesh is proven to lie in the capsules. Parts that collide
-in the middle of the joint ranges and nearly everywhere are written as pairs that may meet.
+joints turn without a stop, as often as --max-turns allows. Links beside the chain belong to the
+arm where they are fixed to it; those that joints beside it move, such as fingers, are left out
+and named, or enclosed in all their positions. Every triangle of a mesh is proven to lie in the
+capsules. Parts that collide in the middle of the joint ranges and nearly everywhere are written as
+pairs that may meet.
 
 exit codes: 0  the file has been written
             2  wrong usage, or a URDF without such a chain (the reason is printed)
@@ -300,6 +301,10 @@ def read_urdf() -> argparse.ArgumentParser:
     add('--radius', type=number('m'), default=0.03, metavar='M', help=radius)
     radius = 'radius of the pointing ray [m] (0; that of the links where these are bars)'
     add('--ray-radius', type=number('m'), metavar='M', help=radius)
+    turns = (
+        'how often continuous joints may turn, either way from 0, for their cables (%(default)g)'
+    )
+    add('--max-turns', type=number('turns'), default=3.0, metavar='N', help=turns)
     add(
         '--include-branches',
         action='store_true',

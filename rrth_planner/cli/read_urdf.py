@@ -5,6 +5,7 @@
 import argparse
 from collections.abc import Sequence
 from dataclasses import replace
+import math
 import sys
 
 import numpy as np
@@ -46,7 +47,7 @@ def _import(options: argparse.Namespace) -> None:
     from rrth_planner.planning.pointing_goals import check_pointing_arm
 
     chain = read_chain(options.file, options.base, options.tool, options.ray)
-    found = import_chain(chain, _mount(options.mount), options.radius)
+    found = import_chain(chain, _mount(options.mount), options.radius, options.max_turns)
     shape: list[str] = []
     if options.geometry == 'collision':
         found, shape = _with_flesh(found, options)
@@ -134,8 +135,7 @@ def _report(found: ImportedArm) -> list[str]:
     for k, name in enumerate(arm.joint_names):
         unit = 'm' if arm.is_prismatic[k] else 'rad'
         low, high = arm.bounds[:, k]
-        endless = chain.moving[k].type == 'continuous'
-        note = ', +-pi for a continuous joint' if endless else ''
+        note = f', {high / math.tau:g} turns either way' if arm.is_continuous[k] else ''
         radius = '' if arm.radii[k] == NO_BARS else f', radius {arm.radii[k]:.4f} m'
         lines.append(f'  {name}: {low:.4f} to {high:.4f} {unit}{radius}{note}')
     lines.append(f'  ray: radius {arm.radii[-1]:.4f} m')

@@ -9,7 +9,7 @@ import numpy as np
 from rrth_planner.collision.reference_checker import bar_distances, bar_ends_at
 from rrth_planner.model.arm import ArmModel, Bar, bars_of, Capsule, mount_bars
 from rrth_planner.model.arrays import Array
-from rrth_planner.model.joint_range import start_bounds
+from rrth_planner.model.joint_range import start_bounds, turns_near
 from rrth_planner.model.reach import reach_table
 
 # Pairs with so many joints between them at most are proven never to collide, if they do not, with
@@ -119,7 +119,8 @@ def _never_collide(arm: ArmModel, pair: BarPair, bars: tuple[Bar, ...], length: 
     joints = list(_joints(arm, pair, bars))
     # A bar that slides may move, too.
     reaches = reach_table(arm, length)[[pair.inner, pair.outer]].max(axis=1).sum(axis=0)[joints]
-    low, high = start_bounds(arm)[:, joints]
+    # Each turn of a continuous joint is as any other.
+    low, high = turns_near(arm, start_bounds(arm), arm.bounds.mean(axis=0), 1)[:, joints]
     middles, halves = 0.5 * (low + high)[None], 0.5 * (high - low)[None]
     n_cells = 1
     while len(middles):

@@ -19,7 +19,8 @@ class JointReading:
     Parameters
     ----------
     positions, velocities : ndarray, shape (dof,)
-        [rad, rad/s]; velocities as given, NaN included, or differences of the positions.
+        [rad, rad/s]; velocities as given, NaN included, or differences of the positions. Those of
+        joints that a driver reports wrapped go on beyond its range.
     taken, received : float
         Time of the measurement: the stamp if it is a little older than the reception, else the
         reception; and that [s].
@@ -28,6 +29,8 @@ class JointReading:
     recent : (ndarray, ndarray) or None
         `taken` of the readings of the last 0.3 s, this one last, (n,) [s], and their positions,
         (n, dof) [rad]; None: nothing is known of others.
+    wound : ndarray, shape (dof,), or None
+        What is added to the positions of the message: whole turns [rad]; None: nothing.
 
     """
 
@@ -37,6 +40,7 @@ class JointReading:
     received: float
     velocities_expire: float
     recent: tuple[Array, Array] | None = None
+    wound: Array | None = None
 
     def is_moving(self, now: float, rest_speed: float = REST_SPEED) -> bool:
         """Return whether the arm moves at a time [s], faster than a speed [rad/s]."""

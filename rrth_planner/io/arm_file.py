@@ -3,6 +3,7 @@
 """An arm as a YAML file, laid out as `config/arm.yaml`."""
 
 from collections.abc import Mapping, Sequence
+import math
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +21,14 @@ LAYOUT = (
     'T = Rx(alpha) Tx(a) Rz(theta + offset) Tz(d).',
     'Lengths in metres, angles in radians; radius: of the bars that the offsets a and d of a row',
     'are; capsules: of the link that the joint moves, in its frame after the row.',
-    'type: revolute, prismatic, or continuous (it turns without a stop).',
+    'type: revolute, prismatic, or continuous: it turns without a stop, so many times either way,',
+    'for its cables, as max_turns says; 3 where there is none.',
     "tool: the frame after the last joint, whose pointing ray leaves along +z; mount: the arm's",
     "base in the wearer's base frame, x forward, y left, z up.",
 )
+
+# Of a continuous joint, either way from 0, where its file says nothing.
+MAX_TURNS = 3.0
 
 
 def arm_to_mapping(arm: ArmModel, name: str) -> dict[str, Any]:
@@ -34,6 +39,10 @@ def arm_to_mapping(arm: ArmModel, name: str) -> dict[str, Any]:
     for k, joint in enumerate(arm.joint_names):
         kind = _kind(arm, k)
         limits = {'lower': lower[k], 'upper': upper[k]}
+        # Without the last digits, which only rounding left.
+        n_turns = round(upper[k] / math.tau, 12)
+        if kind == 'continuous' and upper[k] == -lower[k] == math.tau * n_turns:
+            limits = {'max_turns': n_turns}
         radius = {} if radii[k] == NO_BARS else {'radius': radii[k]}
         row = {'name': joint, 'type': kind, **rows[k], **limits, **radius}
         joints.append(row | _capsules_of(arm, k + 1))
@@ -49,6 +58,24 @@ def arm_to_mapping(arm: ArmModel, name: str) -> dict[str, Any]:
         'mount': mount | _capsules_of(arm, 0),
     }
     return result | ({'allowed': [list(pair) for pair in arm.allowed]} if arm.allowed else {})
+
+
+def turn_bounds(max_turns: float, name: str = 'max_turns') -> Array:
+    """
+    Return the limits of a continuous joint that may wind so many turns either way, (2, 1) [rad].
+
+    Raises
+    ------
+    ModelError
+        None or fewer, or more than an angle may have.
+
+    """
+    if not 0.0 < max_turns * math.tau <= FARTHEST:
+        raise ModelError(
+            f'{name}: {max_turns:g}, expected a number above 0, up to '
+            f'{int(FARTHEST / math.tau)} [turns]'
+        )
+    return math.tau * max_turns * np.array([[-1.0], [1.0]])
 
 
 def _kind(arm: ArmModel, k: int) -> str:
@@ -160,8 +187,12 @@ def _capsules(data: Any, link: int, dof: int) -> list[Capsule]:
 
 def _joint(index: int, data: Any) -> dict[str, Any]:
     """Return what an arm's file says of a joint, its radius included."""
-    wanted = ('name', 'type', *ROW, 'lower', 'upper')
-    given = mapping(data, f'joint {index}', wanted, ModelError, ('radius', 'capsules'))
+    limits = ['lower', 'upper']
+    is_turning = isinstance(data, Mapping) and data.get('type') == 'continuous'
+    is_limited = not is_turning or any(key in data for key in limits)
+    wanted = ('name', 'type', *ROW, *(limits if is_limited else ()))
+    optional = ('radius', 'capsules', *(() if is_limited else ('max_turns',)))
+    given = mapping(data, f'joint {index}', wanted, ModelError, optional)
     label = f'joint "{printable(given["name"], f"joint {index}: name", ModelError)}"'
     kind = given['type']
     if kind not in ('continuous', 'revolute', 'prismatic'):
@@ -169,8 +200,12 @@ def _joint(index: int, data: Any) -> dict[str, Any]:
             f'{label}: type {shown(kind)}, expected continuous, revolute or prismatic'
         )
     limit = 'm' if kind == 'prismatic' else 'rad'
-    units = {**ROW, 'lower': limit, 'upper': limit, 'radius': 'm'}
-    return {**given, **_numbers(given, label, units)}
+    units = {**ROW, 'lower': limit, 'upper': limit, 'max_turns': 'turns', 'radius': 'm'}
+    row = {**given, **_numbers(given, label, units)}
+    if not is_limited:
+        found = turn_bounds(row.get('max_turns', MAX_TURNS), f'{label}: max_turns')
+        (row['lower'],), (row['upper'],) = found.tolist()
+    return row
 
 
 def _tool(data: Any) -> dict[str, Any]:

@@ -86,7 +86,8 @@ class ArmModel:
         Pairs that may meet: a part of the arm, by the name that messages give it, and another
         part or a box.
     is_continuous : tuple of bool
-        Which revolute joints have no stop, but limits of their numbers; empty: none.
+        Which revolute joints have no stop: their limits only say how far their cables may wind;
+        empty: none.
 
     Raises
     ------

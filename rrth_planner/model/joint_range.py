@@ -3,6 +3,7 @@
 """Where joints may be: motions within their limits, goals within less, a start a little beyond."""
 
 import functools
+import math
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +14,8 @@ from rrth_planner.model.trajectory import part_of, piece_coefficients, positions
 
 # How far beyond its limit a joint may be at the start of a motion [rad], [m].
 FARTHEST_BEYOND, FARTHEST_BEYOND_SLIDING = 0.05, 0.005
+# Likewise of a continuous joint, which has no stop there: it winds back [rad].
+FARTHEST_TURNED = math.tau
 # How far from its limit a joint is at a goal [rad], [m]: a drive that stops a little further, or
 # an encoder that reads a little more, is not beyond it. At most this share of the joint's range.
 GOAL_ROOM, GOAL_ROOM_SLIDING, GOAL_SHARE = 0.005, 0.0005, 0.25
@@ -42,11 +45,41 @@ def start_bounds(arm: ArmModel) -> Array:
     """
     Return the least and greatest joint positions at the start of a motion, (2, dof) [rad or m].
 
-    A continuous joint has no stop: beyond its limits its positions may mean another turn.
+    From this far beyond its limits a joint is led in; a continuous one from a turn.
     """
     beyond = _of_each(arm, FARTHEST_BEYOND, FARTHEST_BEYOND_SLIDING)
-    beyond[np.array(arm.is_continuous)] = 0.0
+    beyond[np.array(arm.is_continuous)] = FARTHEST_TURNED
     return _frozen(arm.bounds[0] - beyond, arm.bounds[1] + beyond)
+
+
+def turns_near(arm: ArmModel, bounds: Array, q: Array, n_turns: float) -> Array:
+    """
+    Return bounds in which continuous joints have a few turns only, those nearest to q.
+
+    Parameters
+    ----------
+    bounds : ndarray, shape (2, dof)
+        Least and greatest joint positions [rad or m].
+    q : ndarray, shape (dof,)
+        In the middle of the turns where the bounds allow it [rad or m].
+    n_turns : float
+        > 0; 1: bounds that contain each pose of the links once.
+
+    Returns
+    -------
+    ndarray, shape (2, dof)
+        Within the bounds; the same object where no joint has more turns.
+
+    """
+    if not any(arm.is_continuous):
+        return bounds
+    low, high = bounds
+    half = n_turns * math.pi
+    is_wide = np.array(arm.is_continuous) & (high - low > 2.0 * half)
+    if not is_wide.any():
+        return bounds
+    middle = np.minimum(np.maximum(q, low + half), high - half)
+    return _frozen(np.where(is_wide, middle - half, low), np.where(is_wide, middle + half, high))
 
 
 def bounds_from(arm: ArmModel, q_start: Array) -> Array:

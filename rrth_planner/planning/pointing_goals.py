@@ -3,9 +3,10 @@
 """The goal manifold of an arm: the configurations whose ray meets a target."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import functools
 from importlib import import_module
+import math
 
 import numpy as np
 from rrth_planner.collision.world import World
@@ -16,12 +17,18 @@ from rrth_planner.model.arm import ArmModel, forward_kinematics
 from rrth_planner.model.arrays import Array, check_dof
 from rrth_planner.model.errors import ModelError
 from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.joint_range import turns_near
 from rrth_planner.planning.problem import PlanningProblem
 
 # Samples of the joints: few are enough mostly; many before all are reported as not free.
 FEW, MANY = 176, 4096
+# Shares of a turn round q_near from which joints that turn freely are drawn, too, since few of the
+# draws from a whole turn are near.
+SHARES = (0.5, 0.25)
 # Most goals that are kept, and most configurations in collision.
 MOST, MOST_BLOCKED = 256, 512
+# Goals with a continuous joint the other way round that are kept, at most.
+MOST_TURNED = 64
 # A joint that moves a point of the ray by less than this, in m per rad or m, does not move it.
 LEAST_MOVE = 1e-6
 
@@ -141,7 +148,8 @@ def goal_configurations(
     Return the free configurations that aim at a target, nearest to q_near first.
 
     The list ends with the first one that a straight free edge reaches, if there is one: no path to
-    a farther one is shorter.
+    a farther one is shorter. Continuous joints are at the turn that is nearest to q_near, and in
+    some goals, one joint in each, at the next one the other way round.
 
     Parameters
     ----------
@@ -150,12 +158,28 @@ def goal_configurations(
     q_near : ndarray, shape (dof,)
         [rad].
     n_draws : int
-        Half of the number of candidates.
+        Half of the number of candidates, of which there are more where joints turn freely.
 
     """
+    check_dof(q_near, arm.dof, 'q_near')
+    check_dof(world.bounds, arm.dof, 'world')
+    bounds = turns_near(arm, world.bounds, q_near, 1.0)
+    found = _goals_within(arm, goal, world, bounds, q_near, n_draws)
+    if bounds is world.bounds:
+        return found
+    for share in SHARES:
+        near = turns_near(arm, world.bounds, q_near, share)
+        other = _goals_within(arm, goal, world, near, q_near, 2 * FEW)
+        if _straight_distance(other, q_near) < _straight_distance(found, q_near):
+            found = other
+    return _with_other_turns(arm, world, q_near, found)
+
+
+def _goals_within(
+    arm: ArmModel, goal: PointingGoal, world: World, bounds: Array, q_near: Array, n_draws: int
+) -> GoalSet:
+    """Return what `goal_configurations` does, within bounds, (2, dof) [rad or m]."""
     kernels, dof = pointing_kernels(arm), arm.dof
-    check_dof(q_near, dof, 'q_near')
-    check_dof(world.bounds, dof, 'world')
     goals, blocked = np.empty((MOST, dof)), np.empty((MOST_BLOCKED, dof))
     blocked_reaches = np.empty(MOST_BLOCKED)
     n_free, n_blocked, is_straight = find_goals(
@@ -164,7 +188,7 @@ def goal_configurations(
         world.resolution,
         world.robot,
         world.obstacles,
-        world.bounds,
+        bounds,
         target_in_mount(arm, goal),
         q_near,
         spreading_ratios(dof - kernels.n_solved),
@@ -183,11 +207,43 @@ def goal_configurations(
     )
 
 
+def _straight_distance(goals: GoalSet, q_near: Array) -> float:
+    """Return how far the goal with a straight free edge is, or infinity [rad]."""
+    if goals.n_bent == len(goals.q_goals):
+        return math.inf
+    return float(np.linalg.norm(goals.q_goals[-1] - q_near))
+
+
+def _with_other_turns(arm: ArmModel, world: World, q_near: Array, found: GoalSet) -> GoalSet:
+    """Return goals and their like with one continuous joint the other way round."""
+    q_goals = found.q_goals
+    low, high = turns_near(arm, world.bounds, q_near, 2.0)
+    turned = [q_goals]
+    for k in np.flatnonzero(arm.is_continuous):
+        others = q_goals.copy()
+        others[:, k] -= np.copysign(math.tau, q_goals[:, k] - q_near[k])
+        turned.append(others[(low[k] <= others[:, k]) & (others[:, k] <= high[k])])
+    n_near, goals = len(q_goals), np.concatenate(turned)
+    distances = np.linalg.norm(goals - q_near, axis=1)
+    # No path to a goal beyond the one with a straight edge is shorter.
+    longest = distances[n_near - 1] if found.n_bent < n_near else np.inf
+    order = np.argsort(distances, kind='stable')
+    further = [i for i in order[distances[order] < longest] if i >= n_near][:MOST_TURNED]
+    kept = sorted([*range(n_near), *further], key=distances.__getitem__)[:MOST]
+    for n, i in enumerate(kept):
+        if i >= n_near and world.is_edge_valid(q_near, goals[i]):
+            return replace(found, q_goals=goals[kept[: n + 1]], n_bent=n)
+    n_bent = len(kept) - (found.n_bent < n_near and kept[-1] == n_near - 1)
+    return replace(found, q_goals=goals[kept], n_bent=n_bent)
+
+
 def pointing_problem(
     arm: ArmModel, goal: PointingGoal, world: World, q_start: Array, goals: GoalSet | None = None
 ) -> PlanningProblem:
     """
     Return the planning problem of a pointing goal.
+
+    It has continuous joints search two turns round the start, and as many as the goals need.
 
     Parameters
     ----------
@@ -209,6 +265,11 @@ def pointing_problem(
         goals = goal_configurations(arm, goal, world, q_start, FEW)
         if len(goals.q_goals) == 0:
             goals = goal_configurations(arm, goal, world, q_start, MANY)
+    bounds = turns_near(arm, world.bounds, q_start, 2.0)
+    if bounds is not world.bounds and len(goals.q_goals) > 0:
+        low, high = goals.q_goals.min(axis=0), goals.q_goals.max(axis=0)
+        bounds = np.array([np.minimum(bounds[0], low), np.maximum(bounds[1], high)])
+        world = replace(world, bounds=bounds)
     return PlanningProblem(
         world=world,
         q_start=q_start,

@@ -18,6 +18,7 @@ from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.arm import ArmModel, forward_kinematics
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import RrthError, SceneError
+from rrth_planner.model.joint_range import turns_near
 from rrth_planner.model.scene import Scene
 from rrth_planner.visualization.arm_view import arm_points, faces_of, fit_axes, ray_of
 
@@ -40,7 +41,8 @@ DOTS_PER_INCH = 110
 
 def frames_figure(arm: ArmModel, scene: Scene) -> Figure:
     """Return a figure of an arm's frames: left on the wearer, right along the arm."""
-    q = arm.bounds[0] + np.resize(SHARE, arm.dof) * (arm.bounds[1] - arm.bounds[0])
+    low, high = turns_near(arm, arm.bounds, np.zeros(arm.dof), 1)
+    q = low + np.resize(SHARE, arm.dof) * (high - low)
     poses = np.concatenate([arm.T_base_mount[None], forward_kinematics(arm, q)])
     size = float(np.ptp(arm_points(arm, q), axis=0).max())
     joints = [f'frame {i}: {name}' for i, name in enumerate(arm.joint_names, start=1)]

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 import numpy as np
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.joint_range import turns_near
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import MotionLimits, sample, Trajectory
 from rrth_planner.visualization.arm_view import draw_motion
@@ -113,7 +114,9 @@ def _draw_curves(
     draw_limits(velocity, np.stack([-limits.velocity, limits.velocity]))
     velocity.set_xlabel('time [s]')
     explain_joints(position, velocity, arm)
-    low, high = float(arm.bounds[0].min()), float(arm.bounds[1].max())
+    # Of the limits of a continuous joint those that are near.
+    near = np.concatenate([turns_near(arm, arm.bounds, q.mean(axis=0), 1), q])
+    low, high = float(near.min()), float(near.max())
     position.set_ylim(low - 0.22 * (high - low), high + 0.08 * (high - low))
     fastest = 1.15 * float(limits.velocity.max())
     velocity.set_ylim(-fastest, fastest)

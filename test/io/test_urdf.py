@@ -92,6 +92,13 @@ def test_any_chain_moves_as_its_urdf_does(seed, has_tail):
         np.testing.assert_allclose(frames_of(robot, arm, q), expected, rtol=0.0, atol=1e-11)
 
 
+def test_a_continuous_joint_stays_one():
+    arm = load_arm(resource_path('config/examples/chest_arm.yaml'))
+    joint = read(arm_to_urdf(arm, np.ones(arm.dof), RADIUS)).joint_map['wrist_roll']
+    assert joint.type == 'continuous'
+    assert (joint.limit.lower, joint.limit.upper, joint.limit.velocity) == (None, None, 1.0)
+
+
 @examples(40)
 @given(SEEDS, st.booleans())
 def test_joints_have_the_kinds_and_limits_of_the_arm(seed, has_tail):

@@ -37,13 +37,43 @@ def test_goals_keep_inside_the_limits_and_starts_may_be_a_little_outside():
     low, high = arm.bounds
     np.testing.assert_allclose(goal_bounds(arm)[0] - low, [0.005, 0.0005, 0.005, 0.002])
     np.testing.assert_allclose(high - goal_bounds(arm)[1], [0.005, 0.0005, 0.005, 0.002])
-    np.testing.assert_allclose(low - start_bounds(arm)[0], [0.05, 0.005, 0.0, 0.05])
-    np.testing.assert_allclose(start_bounds(arm)[1] - high, [0.05, 0.005, 0.0, 0.05])
-    q = np.array([low[0] - 0.05, 0.204, high[2] + 0.01, 1.1])
-    expected = np.array([[q[0], *low[1:]], [high[0], 0.204, *high[2:]]])
+    np.testing.assert_allclose(low - start_bounds(arm)[0], [0.05, 0.005, 2.0 * np.pi, 0.05])
+    np.testing.assert_allclose(start_bounds(arm)[1] - high, [0.05, 0.005, 2.0 * np.pi, 0.05])
+    q = np.array([low[0] - 0.05, 0.204, high[2] + 6.0, 1.1])
+    expected = np.array([[q[0], *low[1:]], [high[0], 0.204, q[2], high[3]]])
     np.testing.assert_array_equal(bounds_from(arm, q), expected)
     assert joints_beyond(arm, q).tolist() == [0, 1, 2, 3]
     assert joints_beyond(arm, np.clip(q, low - 1e-7, high + 1e-7)).tolist() == []
+
+
+def test_a_file_says_how_often_a_continuous_joint_may_turn():
+    row = {
+        'name': 'joint_3',
+        'type': 'continuous',
+        'alpha': 1.0,
+        'a': 0.0,
+        'offset': 0.0,
+        'd': 0.1,
+    }
+    data = table_1_mapping()
+    for given_turns, n_turns in (({}, 3.0), ({'max_turns': 0.5}, 0.5), ({'max_turns': 1.7}, 1.7)):
+        data['joints'][2] = row | given_turns
+        arm = arm_from_mapping(data)
+        assert arm.bounds[:, 2].tolist() == [-n_turns * 2.0 * np.pi, n_turns * 2.0 * np.pi]
+        written = arm_to_mapping(arm, 'arm')['joints'][2]
+        assert written['max_turns'] == n_turns and 'lower' not in written
+    data['joints'][2] = row | {'lower': -1.0, 'upper': 2.0}
+    arm = arm_from_mapping(data)
+    assert arm.bounds[:, 2].tolist() == [-1.0, 2.0]
+    assert arm_to_mapping(arm, 'arm')['joints'][2]['upper'] == 2.0
+    for wrong in (0, -1.0, 2000, 'many'):
+        data['joints'][2] = row | {'max_turns': wrong}
+        with pytest.raises(ModelError, match='"joint_3": max_turns: .*, expected a number'):
+            arm_from_mapping(data)
+    for both in ({'lower': -1.0, 'upper': 2.0, 'max_turns': 1.0}, {'lower': -1.0}):
+        data['joints'][2] = row | both
+        with pytest.raises(ModelError, match='expected'):
+            arm_from_mapping(data)
 
 
 def test_which_joints_are_continuous_is_kept_in_a_file_and_must_fit_the_arm():

@@ -38,7 +38,7 @@ def test_the_file_is_what_read_urdf_makes_of_the_urdf(tmp_path):
     from rrth_planner.cli import read_urdf
 
     made, there = tmp_path / 'arm.yaml', resource_path(ARM)
-    options = ['--ray', '+x', '--radius', '0.025', '--output', str(made)]
+    options = ['--ray', '+x', '--radius', '0.025', '--max-turns', '0.5', '--output', str(made)]
     assert read_urdf.main([str(resource_path(URDF)), *options]) == 0
     assert made.read_text() == there.read_text()
 

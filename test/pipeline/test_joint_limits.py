@@ -219,14 +219,17 @@ def test_several_joints_are_led_in_at_once_turning_and_sliding():
     assert plan.sentence.startswith('rail is at 0.3051 m, expected -0.3 to 0.3 m')
 
 
-def test_a_continuous_joint_is_never_led_in():
+def test_a_continuous_joint_is_led_in_from_up_to_a_turn_beyond():
     arm = replace(pan_tilt(pan=(-np.pi, np.pi)), is_continuous=(True, False))
     target = along_the_ray(arm, [0.0, 0.3])
     assert ask(arm, Scene(()), [np.pi, 0.0], target).status is PlanStatus.SOLVED
-    for beyond in (1e-5, 0.01):
+    for beyond in (1e-5, 0.01, 6.28):
         plan = ask(arm, Scene(()), [np.pi + beyond, 0.0], target)
-        assert plan.status is PlanStatus.START_OUT_OF_BOUNDS
-        assert plan.sentence.startswith('pan is at 3.1')
+        assert plan.status is PlanStatus.SOLVED, plan.sentence
+        assert 'pan led in from' in plan.sentence
+    plan = ask(arm, Scene(()), [3.01 * np.pi, 0.0], target)
+    assert plan.status is PlanStatus.START_OUT_OF_BOUNDS
+    assert plan.sentence.startswith('pan is at 9.456')
     assert ask(arm, Scene(()), [np.pi, 1.01], target).status is PlanStatus.SOLVED
 
 

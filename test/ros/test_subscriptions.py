@@ -4,6 +4,7 @@
 
 import time
 
+import numpy as np
 import pytest
 
 pytest.importorskip('rclpy')
@@ -263,6 +264,49 @@ def test_without_velocities_the_change_of_the_positions_counts():
     assert second.velocities_expire == 10.5
     at_once = joint_reading(JointState(name=JOINTS, position=moved), JOINTS, 10.0, first)
     assert at_once.velocities[0] > 1e6
+
+
+def wrapped(angle, low):
+    """Return an angle as a driver reports it that wraps, from low on [rad]."""
+    return low + (angle - low) % (2.0 * np.pi)
+
+
+@pytest.mark.parametrize('low', [-np.pi, 0.0])
+@pytest.mark.parametrize('has_velocities', [False, True])
+def test_positions_that_a_driver_wraps_go_on(low, has_velocities):
+    is_continuous = (False, False, False, True)
+    begin = wrapped(3.0, low)
+    reading, noise = None, np.random.default_rng(0)
+    way = np.concatenate([np.linspace(3.0, 16.0, 300), np.linspace(16.0, -9.0, 600)])
+    for k, angle in enumerate(way + noise.uniform(-1e-3, 1e-3, len(way))):
+        msg = JointState(name=JOINTS, position=[*FOLDED[:3], wrapped(angle, low)])
+        if has_velocities:
+            msg.velocity = [0.0] * 4
+        reading = joint_reading(msg, JOINTS, 10.0 + 0.02 * k, reading, is_continuous)
+        assert reading.positions[3] == pytest.approx(angle - 3.0 + begin, abs=1e-9)
+        assert np.abs(reading.velocities).max() < 5.0
+    # After a while, too: this driver has been seen to wrap.
+    msg = JointState(name=JOINTS, position=[*FOLDED[:3], wrapped(-9.2, low)])
+    reading = joint_reading(msg, JOINTS, 90.0, reading, is_continuous)
+    assert reading.positions[3] == pytest.approx(-9.2 - 3.0 + begin, abs=1e-9)
+
+
+def test_positions_that_a_driver_counts_are_taken_as_they_are():
+    is_continuous, reading = (False, False, False, True), None
+    # The last one: it was started again, and has forgotten the turns.
+    for k, angle in enumerate((3.1, 3.2, 4.0, 9.0, 9.0, 2.7168)):
+        msg = JointState(name=JOINTS, position=[*FOLDED[:3], angle])
+        reading = joint_reading(msg, JOINTS, 10.0 + 0.02 * k, reading, is_continuous)
+        assert reading.positions[3] == angle
+    # Without turns: it may have been turned by hand, and commands refer to what it reports.
+    for k, angle in enumerate((3.1, -3.1)):
+        msg = JointState(name=JOINTS, position=[*FOLDED[:3], angle])
+        reading = joint_reading(msg, JOINTS, 20.0 + 2.0 * k, reading, is_continuous)
+        assert reading.positions[3] == angle
+    # Joints with stops do not wrap.
+    first = joint_reading(JointState(name=JOINTS, position=[3.1] * 4), JOINTS, 1.0, None)
+    other = JointState(name=JOINTS, position=[-3.1] * 4)
+    assert (joint_reading(other, JOINTS, 1.01, first, (False,) * 4).positions == -3.1).all()
 
 
 @pytest.mark.usefixtures('ros_context')

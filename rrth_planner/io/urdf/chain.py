@@ -54,7 +54,7 @@ class UrdfChain:
     joints, moving : tuple of yourdfpy.Joint
         All from base to tool, as they are in the file, and those that move.
     bounds : ndarray, shape (2, dof)
-        [rad or m], +-pi for continuous joints.
+        [rad or m], one turn, +-pi, for continuous joints.
     points, directions : ndarray, shape (dof + 1, 3)
         The joints' origins [m] and axes; last the tool's origin and its ray.
     x_first : ndarray, shape (3,)

@@ -87,16 +87,14 @@ def arm_to_urdf(
         kind = 'fixed'
         if i < arm.dof:
             kind = 'prismatic' if arm.is_prismatic[i] else 'revolute'
+            kind = 'continuous' if arm.is_continuous[i] else kind
         joint = _add_joint(robot, joints[i + 1], kind, links[i + 1 :], poses[i])
         if i < arm.dof:
             ElementTree.SubElement(joint, 'axis', xyz='0 0 1')
             lower, upper = arm.bounds[:, i].tolist()
-            limit = {
-                'lower': lower,
-                'upper': upper,
-                'velocity': float(speeds[i]),
-                'effort': EFFORT,
-            }
+            limit = {'velocity': float(speeds[i]), 'effort': EFFORT}
+            if kind != 'continuous':
+                limit = {'lower': lower, 'upper': upper, **limit}
             ElementTree.SubElement(joint, 'limit', {key: repr(x) for key, x in limit.items()})
     ElementTree.indent(robot)
     return f'<?xml version="1.0"?>\n{ElementTree.tostring(robot, encoding="unicode")}\n'

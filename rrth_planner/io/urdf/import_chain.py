@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import math
 
 import numpy as np
+from rrth_planner.io.arm_file import MAX_TURNS, turn_bounds
 from rrth_planner.io.urdf.capsules import line_distances
 from rrth_planner.io.urdf.chain import UrdfChain
 from rrth_planner.io.urdf.dh_parameters import rows_of_axes
@@ -64,27 +65,32 @@ class ImportedArm:
         return float(far), float(tilt)
 
 
-def import_chain(chain: UrdfChain, T_base_link: Array, radius: float) -> ImportedArm:
+def import_chain(
+    chain: UrdfChain, T_base_link: Array, radius: float, max_turns: float = MAX_TURNS
+) -> ImportedArm:
     """
     Return the arm of a chain; T_base_link, shape (4, 4), and radius [m] as in `ImportedArm`.
+
+    max_turns: how often continuous joints may turn, either way from 0.
 
     Raises
     ------
     ModelError
-        A radius that is negative or not finite, or a pose that is none.
+        A radius that is negative or not finite, a pose that is none, or no number of turns.
 
     """
     if not 0.0 <= radius < np.inf:
         raise ModelError(f'radius: {radius}, expected a length >= 0 [m]')
+    is_continuous = tuple(joint.type == 'continuous' for joint in chain.moving)
     T_0, dh, ray_lead = rows_of_axes(chain.points, chain.directions, chain.x_first)
     arm = ArmModel(
         joint_names=tuple(joint.name for joint in chain.moving),
         is_prismatic=tuple(joint.type == 'prismatic' for joint in chain.moving),
         dh=dh,
-        bounds=chain.bounds,
+        bounds=np.where(is_continuous, turn_bounds(max_turns), chain.bounds),
         radii=np.full(len(dh), radius),
         T_base_mount=T_base_link @ T_0,
-        is_continuous=tuple(joint.type == 'continuous' for joint in chain.moving),
+        is_continuous=is_continuous,
     )
     points = chain.points @ T_base_link[:3, :3].T + T_base_link[:3, 3]
     return ImportedArm(

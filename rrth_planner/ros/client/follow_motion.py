@@ -13,6 +13,7 @@ from rrth_planner.model.errors import MessageError
 from rrth_planner.model.trajectory import positions_at, Trajectory
 from rrth_planner.ros.client.answer_parser import Answer
 from rrth_planner.ros.client.planner_client import NotInTimeError, PlannerClient
+from rrth_planner.ros.messages.joint_state import gaps_between
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg
 from tqdm import tqdm  # type: ignore[import-untyped]
 from trajectory_msgs.msg import JointTrajectory
@@ -96,7 +97,7 @@ def follow(
             'the arm was stopped, and no motion to the target was published on '
             f'{topic} within {client.timeout:g} s'
         )
-    gaps = np.abs(client.positions() - motion.positions[-1])
+    gaps = gaps_between(client.positions(), motion.positions[-1])
     k = int(np.argmax(gaps))
     hint = '' if client.count_arms() > 0 else f'; {topic} has no other subscriber'
     raise NotInTimeError(

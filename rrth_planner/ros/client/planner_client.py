@@ -40,6 +40,7 @@ from rrth_planner.ros.messages.diagnostics import GIVEN_UP_KEY, REQUEST_KEY
 from rrth_planner.ros.messages.error_codes import ErrorCode
 from rrth_planner.ros.messages.joint_state import (
     configuration_from_msg,
+    gaps_between,
     joint_reading,
 )
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg
@@ -296,7 +297,7 @@ class PlannerClient(Node):
     def is_still_at(self, q: Array, tolerance: float, speed: float) -> bool:
         """Return whether the arm is so close to q [rad], and no faster than a speed [rad/s]."""
         reading = self._reading
-        if reading is None or np.abs(reading.mean_positions() - q).max() > tolerance:
+        if reading is None or gaps_between(reading.mean_positions(), q).max() > tolerance:
             return False
         return bool((np.abs(reading.mean_velocities()) <= speed).all())
 
@@ -349,7 +350,9 @@ class PlannerClient(Node):
     def _on_state(self, msg: JointState, _: Arrival) -> None:
         try:
             now = self.get_clock().now().nanoseconds * 1e-9
-            self._reading = joint_reading(msg, self.joint_names, now, self._reading)
+            # No other joint jumps by half a turn between two messages either.
+            may_wrap = (True,) * len(self.joint_names)
+            self._reading = joint_reading(msg, self.joint_names, now, self._reading, may_wrap)
         except MessageError:
             # Of other joints, or invalid: the last state counts.
             return

@@ -138,7 +138,8 @@ class RecordingReader:
             nonlocal before
             if not has_joint_of(recorded.msg, names):
                 return None
-            before = joint_reading(recorded.msg, names, recorded.received / NANOSECONDS, before)
+            received = recorded.received / NANOSECONDS
+            before = joint_reading(recorded.msg, names, received, before, self._arm.is_continuous)
             return before
 
         return [reading for reading in self._good('joint_states', read) if reading is not None]

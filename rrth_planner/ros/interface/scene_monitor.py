@@ -79,7 +79,7 @@ class SceneMonitor:
     ) -> None:
         """Subscribe."""
         self._node = node
-        self._joint_names = parameters.arm.joint_names
+        self._arm, self._joint_names = parameters.arm, parameters.arm.joint_names
         self._base_frame, self._latency = parameters.base_frame, parameters.body_latency
         self._on_change, self._notify_body = on_change, on_body
         self._check_clock = check_clock
@@ -217,7 +217,9 @@ class SceneMonitor:
         now, source = self._now(), self._inputs.joints
         self._take(
             source,
-            lambda: joint_reading(msg, self._joint_names, now, source.value),
+            lambda: joint_reading(
+                msg, self._joint_names, now, source.value, self._arm.is_continuous
+            ),
             stamped_at(msg, now),
         )
         if set(self._joint_names) <= set(msg.name):

@@ -3,6 +3,7 @@
 """Positions and velocities of an arm from joint states that may have other joints, too."""
 
 from collections.abc import Sequence
+import math
 
 import numpy as np
 from rrth_planner.execution.joint_reading import JointReading, with_earlier
@@ -15,6 +16,8 @@ from sensor_msgs.msg import JointState
 LONGEST_WAY = 1.0
 # Positions that are older than this say nothing about the present velocity [s].
 DIFFERENCE_AGE = 0.5
+# Ranges in which drivers that wrap report positions, and how far noise gets beyond [rad].
+WRAPPED, NOISE = ((-math.pi, math.pi), (0.0, math.tau)), 0.1
 
 
 def has_joint_of(msg: JointState, joint_names: Sequence[str]) -> bool:
@@ -50,6 +53,13 @@ def configuration_from_msg(msg: JointState, joint_names: Sequence[str]) -> Array
     return frozen_array(q, (len(q),), label, 'rad', MessageError, FARTHEST)
 
 
+def gaps_between(q: Array, other: Array) -> Array:
+    """Return how far joints are apart, whole turns aside: drivers may wrap, (dof,) [rad]."""
+    gaps = q - other
+    apart: Array = np.abs(gaps - math.tau * np.round(gaps / math.tau))
+    return apart
+
+
 def stamped_at(msg: JointState, received: float) -> float:
     """
     Return when a message was measured [s]: its stamp.
@@ -60,14 +70,47 @@ def stamped_at(msg: JointState, received: float) -> float:
     return stamp if 0.0 < stamp <= received else received
 
 
+def _wound(
+    q: Array, is_continuous: Sequence[bool], received: float, before: JointReading | None
+) -> Array | None:
+    """
+    Return the turns that a driver that wraps leaves out, (dof,) [rad], or None.
+
+    From one reading to the next within the range of such a driver, a joint that jumps by more than
+    half a turn has gone on beyond the end of that range. After a while without readings this holds
+    only of joints that have done so before: a driver that counts turns may have been started
+    again, and to what it then reports all commands refer.
+    """
+    if before is None or not any(is_continuous):
+        return None
+    wound = np.zeros(len(q)) if before.wound is None else before.wound
+    last = before.positions - wound
+    jumps = math.tau * np.round((q - last) / math.tau)
+    pair = np.array([q, last])
+    is_wrapped = np.array(is_continuous) & np.any(
+        [((pair >= low - NOISE) & (pair <= high + NOISE)).all(axis=0) for low, high in WRAPPED],
+        axis=0,
+    )
+    if not 0.0 <= received - before.received <= DIFFERENCE_AGE:
+        is_wrapped &= (wound != 0.0) | (jumps == 0.0)
+    # Whoever reports more than a turn does not wrap.
+    wound = np.where(is_wrapped, wound - jumps, 0.0)
+    return wound if wound.any() else None
+
+
 def joint_reading(
-    msg: JointState, joint_names: Sequence[str], received: float, before: JointReading | None
+    msg: JointState,
+    joint_names: Sequence[str],
+    received: float,
+    before: JointReading | None,
+    is_continuous: Sequence[bool] = (),
 ) -> JointReading:
     """
     Return the positions and velocities of these joints, by name; others are ignored.
 
     Of a message without velocities, received at a time [s], these are the change since the reading
-    before.
+    before. Positions of continuous joints that a driver reports wrapped, from -pi to pi or from 0
+    to 2 pi, go on from those of that reading.
 
     Raises
     ------
@@ -76,6 +119,10 @@ def joint_reading(
 
     """
     q = configuration_from_msg(msg, joint_names)
+    wound = _wound(q, is_continuous, received, before)
+    if wound is not None:
+        q = q + wound
+        q.setflags(write=False)
     names, measured = list(msg.name), stamped_at(msg, received)
     taken = measured if received - measured <= LONGEST_WAY else received
     recent = with_earlier(q, taken, before)
@@ -86,12 +133,12 @@ def joint_reading(
                 'one a name [rad/s]'
             )
         v = np.array([msg.velocity[names.index(name)] for name in joint_names], dtype=np.float64)
-        return JointReading(q, v, taken, received, float('inf'), recent)
+        return JointReading(q, v, taken, received, float('inf'), recent, wound)
     if before is None or received < before.received:
         # After a step back of the clock the elapsed time is unknown.
-        return JointReading(q, np.zeros_like(q), taken, received, received, recent)
+        return JointReading(q, np.zeros_like(q), taken, received, received, recent, wound)
     step = max(received - before.received, 1e-9)
     # What overflows is infinite, and never at rest.
     with np.errstate(over='ignore'):
         v = (q - before.positions) / step
-    return JointReading(q, v, taken, received, before.received + DIFFERENCE_AGE, recent)
+    return JointReading(q, v, taken, received, before.received + DIFFERENCE_AGE, recent, wound)

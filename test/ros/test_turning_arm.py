@@ -1,0 +1,127 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Planner and playback as processes, with a joint that turns without a stop, and drivers of it."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('fcl')
+
+from geometry_msgs.msg import PointStamped  # noqa: E402
+from rclpy.node import Node  # noqa: E402
+from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
+from rrth_planner.io.arm_file import arm_to_yaml  # noqa: E402
+from rrth_planner.model.arm import ArmModel, pointing_error  # noqa: E402
+from rrth_planner.ros.middleware.child_process import ChildProcess  # noqa: E402
+import samples  # noqa: E402
+from sensor_msgs.msg import JointState  # noqa: E402
+from std_srvs.srv import Trigger  # noqa: E402
+from trajectory_msgs.msg import JointTrajectory  # noqa: E402
+from visualization_msgs.msg import MarkerArray  # noqa: E402
+
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures('ros_context')]
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+QUARTER, TURN = 0.5 * np.pi, 2.0 * np.pi
+ARM = ArmModel(
+    joint_names=('pan', 'tilt'),
+    is_prismatic=(False, False),
+    dh=np.array([[0.0, 0.0, 0.0, 0.1], [QUARTER, 0.0, QUARTER, 0.0], [QUARTER, 0.0, 0.0, 0.0]]),
+    bounds=np.array([[-3.0 * TURN, -1.0], [3.0 * TURN, 1.0]]),
+    radii=np.full(3, 0.01),
+    T_base_mount=np.eye(4),
+    is_continuous=(True, False),
+)
+
+
+class Driver(Node):
+    """The inputs of the planner; it reports what the playback does, wrapped or as it is."""
+
+    def __init__(self):
+        super().__init__('driver')
+        self.wraps, self.states, self.motions = False, [], []
+        self.body = self.create_publisher(MarkerArray, 'body_boxes', LATCHED)
+        self.target = self.create_publisher(PointStamped, 'target', LATCHED)
+        self.joints = self.create_publisher(JointState, 'joint_states', 100)
+        self.create_subscription(JointState, 'true_states', self._report, 500)
+        self.create_subscription(JointTrajectory, 'joint_trajectory', self.motions.append, LATCHED)
+        self.plan = self.create_client(Trigger, 'rrth_planner/plan')
+
+    def _report(self, msg):
+        self.states.append(msg)
+        pan, tilt = msg.position
+        pan = (pan + np.pi) % TURN - np.pi if self.wraps else pan
+        reported = JointState(name=msg.name, position=[pan, tilt], velocity=msg.velocity)
+        reported.header = msg.header
+        self.joints.publish(reported)
+
+
+def test_every_motion_begins_at_the_reading_and_ends_on_the_target(
+    tmp_path, wait_until, send, ask, spinning
+):
+    file = tmp_path / 'arm.yaml'
+    file.write_text(arm_to_yaml(ARM, 'arm'))
+    driver, said = Driver(), []
+    ros = ['--ros-args', '-p', f'arm:={file}', '-p']
+    # A message that is late on a busy machine is taken, one that is of another turn is not.
+    start = [*ros, 'start_tolerance:=0.3', '-p']
+
+    def playback(pan):
+        driver.states.clear()
+        return ChildProcess(
+            'rrth_planner.ros.playback_node',
+            [*start, f'initial_positions:=[{pan}, 0.0]', '-r', 'joint_states:=true_states'],
+            said.append,
+        )
+
+    def is_listening():
+        """Return whether both subscriptions of the new playback are there, and no others."""
+        listeners = driver.get_subscriptions_info_by_topic('joint_trajectory')
+        names = [listener.node_name for listener in listeners]
+        return driver.states and names.count('arm_playback') == 2
+
+    def go(way):
+        """Have the arm point somewhere else, so far round [rad]."""
+        begin = np.array(driver.states[-1].position)
+        n_motions, angle = len(driver.motions), begin[0] + way
+        target = np.array([2.0 * np.cos(angle), 2.0 * np.sin(angle), 0.3])
+        send(driver, driver.target, samples.target(*target))
+        answer = ask(driver.plan)
+        assert answer.success, (answer.message, said)
+        wait_until(lambda: len(driver.motions) > n_motions)
+        points = driver.motions[-1].points
+        end = np.array(points[-1].positions)
+        assert pointing_error(ARM, end, target) < 1e-6
+
+        def is_there():
+            assert not [line for line in said if 'rejected' in line], said
+            state = driver.states[-1]
+            return np.abs(end - state.position).max() < 1e-6 and not np.any(state.velocity)
+
+        wait_until(is_there)
+        return begin, np.array(points[0].positions), end
+
+    planner = ChildProcess(
+        'rrth_planner.ros.planner_node',
+        [*ros, 'seed:=3', '-p', 'separation:=false'],
+        said.append,
+    )
+    with planner, spinning(driver):
+        wait_until(driver.plan.service_is_ready, 240.0)
+        send(driver, driver.body, samples.array(samples.box('far', center=[0.0, 0.0, -5.0])))
+        # A driver that counts: it is started again, at another turn each time.
+        for pan, way in ((3.1, 0.5), (-3.1, -0.5), (9.0, 2.0), (-17.0, 1.0)):
+            with playback(pan):
+                wait_until(is_listening)
+                begin, first, end = go(way)
+                assert np.abs(first - begin).max() < 1e-9
+                assert begin[0] == pan and end[0] == pytest.approx(pan + way, abs=1e-6)
+        # One that wraps: the arm goes round and round, and the count goes on.
+        driver.wraps = True
+        with playback(3.0):
+            wait_until(is_listening)
+            for way in (2.0, 2.0, 2.0, 2.0, -2.5, -2.5, -2.5, -2.5, -2.5):
+                begin, first, end = go(way)
+                assert np.abs(first - begin).max() < 1e-9
+                assert end[0] == pytest.approx(begin[0] + way, abs=1e-6)
+    assert not [line for line in said if 'rejected' in line or 'ERROR' in line], said
