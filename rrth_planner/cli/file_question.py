@@ -15,11 +15,13 @@ from rrth_planner.io.settings import load_settings, PlanSettings
 from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.arm import ArmModel, tool_pose
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import OptionsError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.pipeline.request import PlanQuestion
 
 if TYPE_CHECKING:
+    from rrth_planner.collision.free_share import FreeShare
     from rrth_planner.pipeline.motion_plan import MotionPlan
 
 # A seed is less than this.
@@ -45,6 +47,34 @@ def start_of(
     if is_packaged:
         return np.array(folded())
     return np.asarray(np.clip(np.zeros(arm.dof), *arm.bounds))
+
+
+def free_share_of(arm: ArmModel, scene: Scene, settings: PlanSettings, name: str) -> 'FreeShare':
+    """Return how freely an arm moves beside a wearer; as `plan_of`, it compiles what it needs."""
+    from rrth_planner.kernels.precompile import prepare_kernels
+
+    prepare_kernels(partial(say, name))
+    from rrth_planner.collision.free_share import free_share
+    from rrth_planner.collision.world import arm_world
+
+    return free_share(arm_world(arm, scene, settings.margin, settings.ray_guard_length))
+
+
+def free_start_of(arm: ArmModel, scene: Scene, settings: PlanSettings, name: str) -> Array:
+    """Return a free configuration of an arm beside a wearer, (dof,) [rad or m], or raise."""
+    found = free_share_of(arm, scene, settings, name)
+    if found.start is None:
+        raise OptionsError(nothing_free(found))
+    return found.start
+
+
+def nothing_free(found: 'FreeShare') -> str:
+    """Return what to do where no configuration of an arm is free."""
+    cause = ' and '.join(f'"{part}"' for part in found.causes[0]) if found.causes else 'its parts'
+    return (
+        'give --mount X Y Z QX QY QZ QW, where the arm has room: none of 1000 configurations is '
+        f'free of the wearer and of itself; most often {cause} collide'
+    )
 
 
 def new_seed(seed: int) -> int:
