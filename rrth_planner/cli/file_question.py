@@ -72,8 +72,9 @@ def nothing_free(found: 'FreeShare') -> str:
     """Return what to do where no configuration of an arm is free."""
     cause = ' and '.join(f'"{part}"' for part in found.causes[0]) if found.causes else 'its parts'
     return (
-        'give --mount X Y Z QX QY QZ QW, where the arm has room: none of 1000 configurations is '
-        f'free of the wearer and of itself; most often {cause} collide'
+        'give --mount X Y Z QX QY QZ QW, a place where the arm has room, such as --mount -0.3 0 '
+        '0.3 0 0 0 1 behind the back: none of 1000 configurations is free of the wearer and of '
+        f'itself; most often {cause} collide'
     )
 
 

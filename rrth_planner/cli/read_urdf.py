@@ -85,9 +85,7 @@ def _import(options: argparse.Namespace) -> None:
     text = arm_to_yaml(found.arm, chain.name, comments, T_base_link)
     options.output.write_text(text, encoding='utf-8')
     worn = 'config/body.yaml' if options.body is None else str(options.body)
-    lines += _report_room(
-        room, f'beside the wearer of {worn}, with a margin of {settings.margin:g} m'
-    )
+    lines += _report_room(room, f'beside the wearer of {worn}, margin {settings.margin:g} m')
     print('\n'.join([*lines, f'written: {options.output}']), flush=True)
     for sentence in implausible(found):
         say('read_urdf', f'warning: {sentence}')
@@ -187,9 +185,8 @@ def _report(found: ImportedArm) -> list[str]:
         radius = '' if arm.radii[k] == NO_BARS else f', radius {arm.radii[k]:.4f} m'
         if not endless and np.isfinite(soft_limits(chain.moving[k])).any():
             limit = chain.moving[k].limit
-            note = (
-                f', soft limits of safety_controller (limits {limit.lower:g} to {limit.upper:g})'
-            )
+            hard = f'{limit.lower:g} to {limit.upper:g}'
+            note = f', within soft limits of safety_controller (limits {hard})'
         lines.append(f'  {name}: {low:.4f} to {high:.4f} {unit}{radius}{note}')
     lines.append(f'  ray: radius {arm.radii[-1]:.4f} m')
     if arm.radii[:-1].max() > found.radius:

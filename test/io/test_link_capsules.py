@@ -27,8 +27,8 @@ from rrth_planner.io.urdf.chain import read_chain
 from rrth_planner.io.urdf.export import arm_to_urdf
 from rrth_planner.io.urdf.geometry import (
     box_triangles,
-    collision_triangles,
     cylinder_triangles,
+    link_triangles,
     mesh_file,
     sphere_triangles,
 )
@@ -130,7 +130,7 @@ def assert_enclosed(found, file, include_branches, n=20):
     model = yourdfpy.URDF.load(str(file), load_meshes=False, build_scene_graph=True)
     arm, chain = found.arm, found.chain
     shapes = {
-        link.name: np.concatenate(collision_triangles(link, file))
+        link.name: np.concatenate(link_triangles(link, file))
         for link in model.robot.links
         if link.collisions
     }
@@ -284,7 +284,7 @@ def test_the_unit_of_a_collada_file_counts(tmp_path):
         shape = collision('<mesh filename="part.dae"/>')
         file = urdf_file(tmp_path, {**LINKS, 'upper': shape})
         (link,) = [x for x in read_chain(file, None, 'tool').robot.links if x.name == 'upper']
-        sizes.append(collision_triangles(link, file)[0].max())
+        sizes.append(link_triangles(link, file)[0].max())
     assert sizes == pytest.approx([0.3, 0.0003])
 
 
