@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The question that files and arguments ask a planner, and its answer."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
@@ -17,6 +17,7 @@ from rrth_planner.model.arm import ArmModel, tool_pose
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import OptionsError
 from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.rotation import pose_matrix
 from rrth_planner.model.scene import Scene
 from rrth_planner.pipeline.request import PlanQuestion
 
@@ -26,6 +27,10 @@ if TYPE_CHECKING:
 
 # A seed is less than this.
 SEEDS = 2**31
+# Where an arm may be worn: farther and farther behind the back, x y z [m] and qx qy qz qw. It has
+# room where more than this share of its configurations is free.
+PLACES = [(-far, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0) for far in (0.3, 0.5, 0.8, 1.2, 2.0)]
+ROOM = 0.1
 
 
 def folded() -> list[float]:
@@ -60,21 +65,35 @@ def free_share_of(arm: ArmModel, scene: Scene, settings: PlanSettings, name: str
     return free_share(arm_world(arm, scene, settings.margin, settings.ray_guard_length))
 
 
-def free_start_of(arm: ArmModel, scene: Scene, settings: PlanSettings, name: str) -> Array:
-    """Return a free configuration of an arm beside a wearer, (dof,) [rad or m], or raise."""
-    found = free_share_of(arm, scene, settings, name)
+def free_start_of(
+    arm: ArmModel, scene: Scene, settings: PlanSettings, arm_at: Callable[[Array], ArmModel]
+) -> Array:
+    """Return a free start of an arm, (dof,) [rad or m], or raise; arm_at as of `nothing_free`."""
+    found = free_share_of(arm, scene, settings, 'plan')
     if found.start is None:
-        raise OptionsError(nothing_free(found))
+        raise OptionsError(nothing_free(found, scene, settings, arm_at))
     return found.start
 
 
-def nothing_free(found: 'FreeShare') -> str:
-    """Return what to do where no configuration of an arm is free."""
+def nothing_free(
+    found: 'FreeShare', scene: Scene, settings: PlanSettings, arm_at: Callable[[Array], ArmModel]
+) -> str:
+    """Return what to do where none is free; arm_at: the arm mounted at a pose, (4, 4) [m]."""
+    for place in PLACES:
+        T = pose_matrix(place[:3], place[3:])
+        if free_share_of(arm_at(T), scene, settings, 'plan').share > ROOM:
+            mount = ' '.join(f'{value:g}' for value in place)
+            remedy = f'give --mount X Y Z QX QY QZ QW, where it has room, such as --mount {mount}'
+            break
+    else:
+        remedy = (
+            'let pairs of its parts meet that cannot in truth (allowed in the file of the arm; '
+            '--srdf of read_urdf)'
+        )
     cause = ' and '.join(f'"{part}"' for part in found.causes[0]) if found.causes else 'its parts'
     return (
-        'give --mount X Y Z QX QY QZ QW, a place where the arm has room, such as --mount -0.3 0 '
-        '0.3 0 0 0 1 behind the back: none of 1000 configurations is free of the wearer and of '
-        f'itself; most often {cause} collide'
+        f'{remedy}: none of 1000 configurations is free of the wearer and of the arm itself; most '
+        f'often {cause} collide'
     )
 
 

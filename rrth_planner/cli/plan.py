@@ -51,7 +51,7 @@ def _plan(options: argparse.Namespace) -> int:
     if not -1 <= settings.seed < SEEDS:
         raise OptionsError(f'seed: {settings.seed}, expected -1 to {SEEDS - 1} [-]')
     if options.start == 'auto':
-        q_start = free_start_of(arm, scene, settings, 'plan')
+        q_start = free_start_of(arm, scene, settings, lambda T: load_arm(options.arm, T))
     else:
         q_start = start_of(options.q_from, '--from', arm, is_packaged=options.arm is None)
     seed = new_seed(settings.seed)

@@ -27,13 +27,15 @@ from rrth_planner.io.urdf.import_chain import (
 )
 from rrth_planner.io.urdf.link_capsules import enclose_links
 from rrth_planner.io.wearer_file import load_body
-from rrth_planner.model.arm import NO_BARS
+from rrth_planner.model.arm import ArmModel, NO_BARS, tool_pose
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import ModelError
 
 if TYPE_CHECKING:
     from rrth_planner.collision.free_share import FreeShare
 
+# How far away a target is proposed, as far as rays are free there [m].
+SIGHT = 1.0
 # So many links of an SRDF that are none of the arm are named.
 MOST_NAMED = 8
 # Bars this much longer than all links together are no links.
@@ -90,13 +92,25 @@ def _import(options: argparse.Namespace) -> None:
     for sentence in implausible(found):
         say('read_urdf', f'warning: {sentence}')
     if room.start is None:
-        say('read_urdf', f'warning: {nothing_free(room)}')
+        at_0 = np.linalg.inv(T_base_link) @ arm.T_base_mount
+        sentence = nothing_free(
+            room, scene, settings, lambda T: replace(arm, T_base_mount=T @ at_0)
+        )
+        say('read_urdf', f'warning: {sentence}')
     else:
         print(
             f'next: {program("plan")} --arm {options.output} '
             + ('' if options.body is None else f'--body {options.body} ')
-            + '--start auto --target 1.5 0.1 0.3'
+            + f'--start auto --target {_target(arm, room)}'
         )
+
+
+def _target(arm: ArmModel, room: 'FreeShare') -> str:
+    """Return a target at which the arm can point, or any, as one types it [m]."""
+    if room.aim is None:
+        return '1.5 0.1 0.3'
+    T = tool_pose(arm, room.aim)
+    return ' '.join(f'{value:g}' for value in np.round(T[:3, 3] + SIGHT * T[:3, 2], 2) + 0.0)
 
 
 def _report_room(room: 'FreeShare', where: str) -> list[str]:

@@ -13,6 +13,8 @@ from rrth_planner.model.arrays import Array
 N_SAMPLES, SEED = 1000, 0
 # A start has so many decimals, as one types it [rad or m].
 DECIMALS = 3
+# How far a pointing ray must reach to aim at something [m].
+SIGHT = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -27,6 +29,8 @@ class FreeShare:
     start : ndarray, shape (dof,), or None
         A free configuration [rad or m]: all joints at 0, or as near to it as they get, if that is
         free, or else the one of them that is farthest from the wearer. None: none is free.
+    aim : ndarray, shape (dof,), or None
+        The free one of them next to the start whose pointing ray is free for `SIGHT`, too.
     causes : tuple of (str, str)
         What collides, the most frequent first: a part of the arm, and another part or a box.
 
@@ -34,6 +38,7 @@ class FreeShare:
 
     share: float
     start: Array | None
+    aim: Array | None
     causes: tuple[tuple[str, str], ...]
 
 
@@ -46,6 +51,7 @@ def free_share(world: World) -> FreeShare:
     start = rest if world.is_valid(rest) else None
     if start is None and free:
         start = _rounded(world, max(free, key=lambda q: _clearance(world, q)))
+    aims = [q for q in free if world.is_valid(q, SIGHT)]
     causes: Counter[tuple[str, str]] = Counter()
     if not free:
         for q in samples:
@@ -53,6 +59,7 @@ def free_share(world: World) -> FreeShare:
     return FreeShare(
         share=len(free) / N_SAMPLES,
         start=start,
+        aim=min(aims, key=lambda q: float(np.linalg.norm(q - start)), default=None),
         causes=tuple(pair for pair, _ in causes.most_common()),
     )
 

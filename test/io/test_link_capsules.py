@@ -235,7 +235,7 @@ def test_meshes_are_found_where_the_urdf_says(tmp_path, monkeypatch):
     [
         (
             '<mesh filename="package://none/other.stl"/>',
-            'no mesh .package://none/other.stl. in or above .*ROS_PACKAGE_PATH.*.none. may be',
+            'set ROS_PACKAGE_PATH to the folder .*"none": .*no mesh .package://none/other.stl. in',
         ),
         ('<mesh filename="http://a/part.stl"/>', 'expected a file, or package'),
         ('<mesh/>', 'no file name'),
@@ -256,8 +256,9 @@ def test_what_cannot_be_read_is_said_in_a_sentence(tmp_path, shape, words):
     (tmp_path / 'broken.stl').write_bytes(stl(TETRAHEDRON)[:100])
     (tmp_path / 'empty.stl').write_bytes(stl(TETRAHEDRON[:0]))
     (tmp_path / 'nan.stl').write_bytes(stl(np.full((1, 3, 3), np.nan)))
-    with pytest.raises(ModelError, match=f'link "upper": collision geometry 0.*({words})'):
+    with pytest.raises(ModelError, match=f'({words})') as problem:
         imported(file)
+    assert 'link "upper": collision geometry 0' in str(problem.value)
 
 
 def test_branches_that_cannot_be_followed_are_said(tmp_path):
@@ -396,7 +397,7 @@ def test_an_srdf_names_pairs_that_may_touch(tmp_path):
     file = tmp_path / 'arm.srdf'
     lines = ''.join(f'<disable_collisions link1="{a}" link2="{b}"/>' for a, b in pairs)
     file.write_text(f'<robot name="r">{lines}</robot>')
-    assert disabled_pairs(file, three_joints()) == (('ball 1', 'ball 3'),)
+    assert disabled_pairs(file, three_joints(), 'r') == ((('ball 1', 'ball 3'),), ['wheel'])
     for text, words in (('<sdf/>', 'an SRDF'), ('<robot><disable_collisions/></robot>', 'link1')):
         file.write_text(text)
         with pytest.raises(ModelError, match=words):

@@ -32,21 +32,24 @@ def only_tool(robot: Any, base: str, ends: Sequence[str], takes_jaw: bool) -> st
 
     """
     choices: dict[str, int] = {}
-    jaws = []
+    jaws, carriers = [], set()
     for end in ends:
         joints = _joints_to(robot, base, end)
+        if not joints and end != base:
+            continue
         jaw = None if takes_jaw else first_jaw_joint(robot, joints)
         if jaw is not None:
             jaws.append(end)
             joints, end = joints[: joints.index(jaw)], jaw.parent
+            carriers.add(end)
         choices[end] = sum(joint.type != 'fixed' for joint in joints)
     moved = {link: n for link, n in choices.items() if n > 0}
-    if len(moved) == 1 and not jaws:
-        return next(iter(moved))
-    ordered = sorted(moved or choices, key=lambda link: -choices[link])
+    if len(moved or choices) == 1 and not jaws:
+        return next(iter(moved or choices))
+    ordered = sorted(moved or choices, key=lambda link: (link not in carriers, -choices[link]))
     named = ', '.join(f'{link} ({choices[link]} joints)' for link in ordered[:MOST_NAMED])
     more = f' and {len(ordered) - MOST_NAMED} more' if len(ordered) > MOST_NAMED else ''
-    why = f'the URDF ends in {len(ends)} links'
+    why = f'the URDF ends in {len(ends)} link{"s" * (len(ends) > 1)}'
     if jaws:
         why += f'; jaws of a gripper are no tools: {shown(jaws)}'
     raise ModelError(f'give --tool LINK, one of {named}{more}: {why}')
