@@ -142,10 +142,10 @@ def _with_flesh(found: ImportedArm, options: argparse.Namespace) -> tuple[Import
         )
     if not flesh.capsules:
         none = 'geometry' if options.geometry == 'visual' else 'collision geometry'
-        shape = f'shape: no {none}: each link is a bar from joint to joint'
+        no_shape = f'shape: no {none}: each link is a bar from joint to joint'
         if flesh.bare:
             say('read_urdf', f'warning: {_seen(flesh.bare)}; links are bars of {found.radius:g} m')
-        return found, [*lines, shape]
+        return found, [*lines, no_shape]
     found = with_capsules(found, flesh.capsules, options.ray_radius or 0.0)
     always = colliding_pairs(found.arm)
     pairs = list(always)

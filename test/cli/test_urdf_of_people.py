@@ -4,6 +4,7 @@
 
 import json
 import os
+from pathlib import Path
 import pty
 import subprocess
 import sys
@@ -101,7 +102,9 @@ def test_links_of_an_srdf_that_are_not_the_arms_are_counted(tmp_path, capsys):
 TURN = (0.1, -0.7, 0.3, 0.6)
 
 
-@pytest.mark.parametrize('q', [(0.0, 0.5**0.5, 0.0, 0.5**0.5), TURN, tuple(3.0 * np.array(TURN))])
+@pytest.mark.parametrize(
+    'q', [(0.0, 0.5**0.5, 0.0, 0.5**0.5), TURN, tuple(3.0 * value for value in TURN)]
+)
 def test_quaternions_of_urdf_1_1_turn_joints_geometry_and_picture(tmp_path, q):
     quat = f'quat_xyzw="{" ".join(map(repr, q))}"'
     body = f'<collision><origin xyz="0.05 0 0" {quat}/>{BOX.format(0.02, 0.3)}</collision>'
@@ -399,6 +402,31 @@ def test_the_remedy_comes_first_however_long_the_rest_is(tmp_path, capsys):
     assert said.startswith('read_urdf: set ROS_PACKAGE_PATH to the folder that has the folder "ar')
     assert read(tmp_path, arm_urdf(), '--tool', 'y' * 900)[0] == 2
     assert 'expected one of' in capsys.readouterr().err
+
+
+ROBOTS = ('lynxmotion_al5d_description/urdf/al5d_robot.urdf',
+          'unimation_puma560_description/urdf/puma560_robot.urdf',
+          'kuka_description/kuka_lbr_iiwa/urdf/lbr_iiwa_14_r820.urdf')  # fmt: skip
+
+
+@pytest.mark.parametrize('robot', ROBOTS)
+def test_what_is_printed_leads_from_a_makers_file_to_a_motion(tmp_path, capsys, robot):
+    rtbdata = pytest.importorskip('rtbdata', reason='rtb-data, with URDFs of makers, is not there')
+    file, arm = Path(rtbdata.__file__).parent / 'xacro' / robot, tmp_path / 'arm.yaml'
+    command = [str(file), '--output', str(arm)]
+    for _ in range(3):
+        read_urdf.main(command)
+        said = capsys.readouterr()
+        if 'next: ' in said.out:
+            break
+        # The remedy that it names.
+        (line,) = (
+            line for line in said.err.splitlines() if ': give ' in line or 'give --' in line
+        )
+        command += line.split('such as ')[1].split(':')[0].split()
+    (following,) = (x for x in said.out.splitlines() if x.startswith('next: '))
+    assert plan.main(following.split()[2:]) == 0
+    assert 'duration' in capsys.readouterr().out
 
 
 PROGRESS = """

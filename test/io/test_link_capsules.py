@@ -398,10 +398,13 @@ def test_an_srdf_names_pairs_that_may_touch(tmp_path):
     lines = ''.join(f'<disable_collisions link1="{a}" link2="{b}"/>' for a, b in pairs)
     file.write_text(f'<robot name="r">{lines}</robot>')
     assert disabled_pairs(file, three_joints(), 'r') == ((('ball 1', 'ball 3'),), ['wheel'])
-    for text, words in (('<sdf/>', 'an SRDF'), ('<robot><disable_collisions/></robot>', 'link1')):
+    for text, words in (
+        ('<sdf/>', 'an SRDF'),
+        ('<robot name="r"><disable_collisions/></robot>', 'link1'),
+    ):
         file.write_text(text)
         with pytest.raises(ModelError, match=words):
-            disabled_pairs(file, three_joints())
+            disabled_pairs(file, three_joints(), 'r')
 
 
 @pytest.mark.skipif(ROBOTS is None, reason='example-robot-data is not there')
