@@ -156,8 +156,8 @@ def _with_flesh(found: ImportedArm, options: argparse.Namespace) -> tuple[Import
         lines.append(f'may meet, by {options.srdf.name}: {_listed(pairs[len(always) :])}')
         if strangers:
             some = ', '.join(strangers[:MOST_NAMED]) + (', ...' * (len(strangers) > MOST_NAMED))
-            n = f'{len(strangers)} link{"s" * (len(strangers) > 1)}'
-            lines.append(f'no part of the arm, but in {options.srdf.name}: {n}: {some}')
+            count = f'{len(strangers)} link{"s" * (len(strangers) > 1)}'
+            lines.append(f'no part of the arm, but in {options.srdf.name}: {count}: {some}')
     if always:
         lines.append(f'may meet, since they nearly always do: {_listed(always)}')
     if flesh.bare:

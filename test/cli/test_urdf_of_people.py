@@ -420,9 +420,7 @@ def test_what_is_printed_leads_from_a_makers_file_to_a_motion(tmp_path, capsys, 
         if 'next: ' in said.out:
             break
         # The remedy that it names.
-        (line,) = (
-            line for line in said.err.splitlines() if ': give ' in line or 'give --' in line
-        )
+        (line,) = (line for line in said.err.splitlines() if 'such as ' in line)
         command += line.split('such as ')[1].split(':')[0].split()
     (following,) = (x for x in said.out.splitlines() if x.startswith('next: '))
     assert plan.main(following.split()[2:]) == 0
