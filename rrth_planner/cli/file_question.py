@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The question that files and arguments ask a planner, and its answer."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
@@ -15,15 +15,22 @@ from rrth_planner.io.settings import load_settings, PlanSettings
 from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.arm import ArmModel, tool_pose
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import OptionsError
 from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.rotation import pose_matrix
 from rrth_planner.model.scene import Scene
 from rrth_planner.pipeline.request import PlanQuestion
 
 if TYPE_CHECKING:
+    from rrth_planner.collision.free_share import FreeShare
     from rrth_planner.pipeline.motion_plan import MotionPlan
 
 # A seed is less than this.
 SEEDS = 2**31
+# Where an arm may be worn: farther and farther behind the back, x y z [m] and qx qy qz qw. It has
+# room where more than this share of its configurations is free.
+PLACES = [(-far, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0) for far in (0.3, 0.5, 0.8, 1.2, 2.0)]
+ROOM = 0.1
 
 
 def folded() -> list[float]:
@@ -45,6 +52,49 @@ def start_of(
     if is_packaged:
         return np.array(folded())
     return np.asarray(np.clip(np.zeros(arm.dof), *arm.bounds))
+
+
+def free_share_of(arm: ArmModel, scene: Scene, settings: PlanSettings, name: str) -> 'FreeShare':
+    """Return how freely an arm moves beside a wearer; as `plan_of`, it compiles what it needs."""
+    from rrth_planner.kernels.precompile import prepare_kernels
+
+    prepare_kernels(partial(say, name))
+    from rrth_planner.collision.free_share import free_share
+    from rrth_planner.collision.world import arm_world
+
+    return free_share(arm_world(arm, scene, settings.margin, settings.ray_guard_length))
+
+
+def free_start_of(
+    arm: ArmModel, scene: Scene, settings: PlanSettings, arm_at: Callable[[Array], ArmModel]
+) -> Array:
+    """Return a free start of an arm, (dof,) [rad or m], or raise; arm_at as of `nothing_free`."""
+    found = free_share_of(arm, scene, settings, 'plan')
+    if found.start is None:
+        raise OptionsError(nothing_free(found, scene, settings, arm_at))
+    return found.start
+
+
+def nothing_free(
+    found: 'FreeShare', scene: Scene, settings: PlanSettings, arm_at: Callable[[Array], ArmModel]
+) -> str:
+    """Return what to do where none is free; arm_at: the arm mounted at a pose, (4, 4) [m]."""
+    for place in PLACES:
+        T = pose_matrix(place[:3], place[3:])
+        if free_share_of(arm_at(T), scene, settings, 'plan').share > ROOM:
+            mount = ' '.join(f'{value:g}' for value in place)
+            remedy = f'give --mount X Y Z QX QY QZ QW, where it has room, such as --mount {mount}'
+            break
+    else:
+        remedy = (
+            'let pairs of its parts meet that cannot in truth (allowed in the file of the arm; '
+            '--srdf of read_urdf)'
+        )
+    cause = ' and '.join(f'"{part}"' for part in found.causes[0]) if found.causes else 'its parts'
+    return (
+        f'{remedy}: none of 1000 configurations is free of the wearer and of the arm itself; most '
+        f'often {cause} collide'
+    )
 
 
 def new_seed(seed: int) -> int:

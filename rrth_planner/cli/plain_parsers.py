@@ -125,14 +125,27 @@ WEARER = 'the wearer, laid out as config/body.yaml, the default, or as msg_examp
 VIEWER_PORT = 8081
 
 
+def _add_mount(parser: argparse.ArgumentParser, text: str) -> None:
+    """Add the option that says where an arm is worn, with its help."""
+    pose = ('X', 'Y', 'Z', 'QX', 'QY', 'QZ', 'QW')
+    parser.add_argument('--mount', type=number('m'), nargs=7, metavar=pose, help=text)
+
+
 def plan() -> argparse.ArgumentParser:
     """Return the parser of all arguments."""
     parser = command_parser('plan', PLAN, PLAN_EPILOG)
     add_target(parser, 'target of the pointing ray [m]')
     add_files(parser, arm='the arm (config/arm.yaml)', body=WEARER)
     add = parser.add_argument
+    _add_mount(
+        parser,
+        "pose of the arm's mount in the wearer's base frame [m]; of an arm from a URDF, that of "
+        'its first link (as in the file of the arm)',
+    )
+    add_start = parser.add_mutually_exclusive_group().add_argument
     start = 'start configuration, one value per joint [rad or m] (folded; with --arm, all 0)'
-    add('--from', dest='q_from', type=number('rad or m'), nargs='+', metavar='Q', help=start)
+    add_start('--from', dest='q_from', type=number('rad or m'), nargs='+', metavar='Q', help=start)
+    add_start('--start', choices=('auto',), help='start from a free configuration that is found')
     add_files(parser, settings='parameters of the node; defaults are those of config/planner.yaml')
     add('--margin', type=number('m'), metavar='M', help='clearance demanded from every box [m]')
     add('--seed', type=integer, metavar='N', help='random seed; -1: a new one each time')
@@ -278,24 +291,20 @@ def read_urdf() -> argparse.ArgumentParser:
     add('file', type=Path, metavar='FILE', help='the URDF file')
     add('--base', metavar='LINK', help='first link of the chain (the root)')
     add('--tool', metavar='LINK', help='last link (the one that ends the chain)')
+    add('--jaw', action='store_true', help='the tool may be what looks like the jaw of a gripper')
     add(
         '--ray',
         default='+z',
         metavar='AXIS',
         help='axis of the tool link that is the pointing ray: +x -x +y -y +z -z (%(default)s)',
     )
-    add(
-        '--mount',
-        type=number('m'),
-        nargs=7,
-        metavar=('X', 'Y', 'Z', 'QX', 'QY', 'QZ', 'QW'),
-        help="pose of the first link in the wearer's base frame [m] (the same frame)",
-    )
+    _add_mount(parser, "pose of the first link in the wearer's base frame [m] (the same frame)")
     add(
         '--geometry',
-        choices=('collision', 'bars'),
+        choices=('collision', 'visual', 'bars'),
         default='collision',
-        help='shape of the links: their collision geometry, if any, or bars (%(default)s)',
+        help='shape of the links: their collision geometry, what is seen of them where that is '
+        'given, or bars (%(default)s; bars where there is none)',
     )
     radius = 'radius of links that are bars [m] (%(default)s)'
     add('--radius', type=number('m'), default=0.03, metavar='M', help=radius)
@@ -313,6 +322,7 @@ def read_urdf() -> argparse.ArgumentParser:
     srdf = 'SRDF whose disable_collisions name pairs of links that may meet'
     add('--srdf', type=Path, metavar='FILE', help=srdf)
     add('--output', type=Path, required=True, metavar='FILE', help='arm file to write')
+    add_files(parser, body='where free configurations are looked for: ' + WEARER)
     check = 'print the tool pose at these joint positions [rad or m]'
     add('--check', type=number('rad or m'), nargs='+', metavar='Q', help=check)
     return parser

@@ -13,6 +13,7 @@ import numpy as np
 from rrth_planner.cli import plain_parsers
 from rrth_planner.cli.file_question import (
     figures_of,
+    free_start_of,
     new_seed,
     plan_of,
     question_of,
@@ -20,6 +21,7 @@ from rrth_planner.cli.file_question import (
     settings_of,
     start_of,
 )
+from rrth_planner.cli.mount_pose import mount_pose
 from rrth_planner.cli.program import run, say
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.motion_file import check_suffix, sampled, write_motion
@@ -43,11 +45,15 @@ def _plan(options: argparse.Namespace) -> int:
         raise OptionsError(
             '--period: given without --output, expected a file to write the points to'
         )
-    arm, scene = load_arm(options.arm), load_body(options.body)
+    T_base_link = None if options.mount is None else mount_pose(options.mount)
+    arm, scene = load_arm(options.arm, T_base_link), load_body(options.body)
     settings = settings_of(arm, options.settings, margin=options.margin, seed=options.seed)
     if not -1 <= settings.seed < SEEDS:
         raise OptionsError(f'seed: {settings.seed}, expected -1 to {SEEDS - 1} [-]')
-    q_start = start_of(options.q_from, '--from', arm, is_packaged=options.arm is None)
+    if options.start == 'auto':
+        q_start = free_start_of(arm, scene, settings, lambda T: load_arm(options.arm, T))
+    else:
+        q_start = start_of(options.q_from, '--from', arm, is_packaged=options.arm is None)
     seed = new_seed(settings.seed)
     question = question_of(arm, scene, q_start, options.target, settings, seed)
     plan = plan_of(question, 'plan')

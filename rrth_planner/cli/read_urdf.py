@@ -7,14 +7,19 @@ from collections.abc import Sequence
 from dataclasses import replace
 import math
 import sys
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rrth_planner.cli import plain_parsers
+from rrth_planner.cli.file_question import free_share_of, nothing_free, settings_of
 from rrth_planner.cli.joint_values import joint_values
-from rrth_planner.cli.program import run
+from rrth_planner.cli.mount_pose import mount_pose
+from rrth_planner.cli.program import program, run, say
+from rrth_planner.cli.progress import Progress
 from rrth_planner.io.arm_file import arm_from_mapping, arm_to_mapping, arm_to_yaml
 from rrth_planner.io.urdf.allowed_pairs import colliding_pairs, disabled_pairs
-from rrth_planner.io.urdf.chain import RAYS, read_chain
+from rrth_planner.io.urdf.chain import RAYS, read_chain, soft_limits
+from rrth_planner.io.urdf.implausible import implausible
 from rrth_planner.io.urdf.import_chain import (
     import_chain,
     ImportedArm,
@@ -22,11 +27,18 @@ from rrth_planner.io.urdf.import_chain import (
     with_ray_radius,
 )
 from rrth_planner.io.urdf.link_capsules import enclose_links
-from rrth_planner.model.arm import NO_BARS
-from rrth_planner.model.arrays import Array, frozen_array
+from rrth_planner.io.wearer_file import load_body
+from rrth_planner.model.arm import ArmModel, NO_BARS, tool_pose
+from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import ModelError
-from rrth_planner.model.rotation import pose_matrix
 
+if TYPE_CHECKING:
+    from rrth_planner.collision.free_share import FreeShare
+
+# How far away a target is proposed, as far as rays are free there [m].
+SIGHT = 1.0
+# So many links of an SRDF that are none of the arm are named.
+MOST_NAMED = 8
 # Bars this much longer than all links together are no links.
 LONG = 2.0
 
@@ -46,10 +58,13 @@ def _import(options: argparse.Namespace) -> None:
     # Not for --help: it has kernels, which take seconds to load and, once, to compile.
     from rrth_planner.planning.pointing_goals import check_pointing_arm
 
-    chain = read_chain(options.file, options.base, options.tool, options.ray)
-    found = import_chain(chain, _mount(options.mount), options.radius, options.max_turns)
+    chain = read_chain(
+        options.file, options.base, options.tool, options.ray, takes_jaw=options.jaw
+    )
+    T_base_link = np.eye(4) if options.mount is None else mount_pose(options.mount)
+    found = import_chain(chain, T_base_link, options.radius, options.max_turns)
     shape: list[str] = []
-    if options.geometry == 'collision':
+    if options.geometry != 'bars':
         found, shape = _with_flesh(found, options)
     if options.srdf is not None and not found.arm.capsules:
         raise ModelError(
@@ -59,22 +74,67 @@ def _import(options: argparse.Namespace) -> None:
     if not found.arm.capsules and options.ray_radius is not None:
         found = with_ray_radius(found, options.ray_radius)
     # As it will be read.
-    arm = arm_from_mapping(arm_to_mapping(found.arm, chain.name))
+    arm = arm_from_mapping(arm_to_mapping(found.arm, chain.name, T_base_link))
     check_pointing_arm(arm)
     lines = _report(found) + shape
     if options.check is not None:
         lines += _report_ray(found, joint_values(options.check, '--check', arm.joint_names))
+    scene, settings = load_body(options.body), settings_of(arm, None)
+    room = free_share_of(arm, scene, settings, 'read_urdf')
     comments = [
         f'The arm of {options.file.name} from link {chain.base} to {chain.tool}, '
         f'ray along {options.ray}.'
     ]
-    options.output.write_text(arm_to_yaml(found.arm, chain.name, comments), encoding='utf-8')
-    print('\n'.join([*lines, f'written: {options.output}']))
+    text = arm_to_yaml(found.arm, chain.name, comments, T_base_link)
+    options.output.write_text(text, encoding='utf-8')
+    worn = 'config/body.yaml' if options.body is None else str(options.body)
+    lines += _report_room(room, f'beside the wearer of {worn}, margin {settings.margin:g} m')
+    print('\n'.join([*lines, f'written: {options.output}']), flush=True)
+    for sentence in implausible(found):
+        say('read_urdf', f'warning: {sentence}')
+    if room.start is None:
+        at_0 = np.linalg.inv(T_base_link) @ arm.T_base_mount
+        sentence = nothing_free(
+            room, scene, settings, lambda T: replace(arm, T_base_mount=T @ at_0)
+        )
+        say('read_urdf', f'warning: {sentence}')
+    else:
+        print(
+            f'next: {program("plan")} --arm {options.output} '
+            + ('' if options.body is None else f'--body {options.body} ')
+            + f'--start auto --target {_target(arm, room)}'
+        )
+
+
+def _target(arm: ArmModel, room: 'FreeShare') -> str:
+    """Return a target at which the arm can point, or any, as one types it [m]."""
+    if room.aim is None:
+        return '1.5 0.1 0.3'
+    T = tool_pose(arm, room.aim)
+    return ' '.join(f'{value:g}' for value in np.round(T[:3, 3] + SIGHT * T[:3, 2], 2) + 0.0)
+
+
+def _report_room(room: 'FreeShare', where: str) -> list[str]:
+    """Return how freely an arm moves, and from where, in lines."""
+    lines = [f'free: {100.0 * room.share:.1f} % of 1000 random configurations, {where}']
+    if room.start is not None:
+        numbers = [round(float(value), 6) + 0.0 for value in room.start]
+        lines.append(
+            f'start: --from {" ".join(f"{value:g}" for value in numbers)} is free, as --start '
+            f'auto finds; of the nodes: -p "initial_positions:={numbers}"'
+        )
+    return lines
 
 
 def _with_flesh(found: ImportedArm, options: argparse.Namespace) -> tuple[ImportedArm, list[str]]:
     """Return an arm with capsules round its links, and a description of them, in lines."""
-    flesh = enclose_links(found, options.include_branches)
+    with Progress('read_urdf') as progress:
+        flesh = enclose_links(
+            found,
+            options.include_branches,
+            options.geometry,
+            lambda link: progress(f'enclosing link "{link}" in capsules'),
+        )
     lines = []
     if flesh.left_out:
         lines.append(
@@ -82,22 +142,27 @@ def _with_flesh(found: ImportedArm, options: argparse.Namespace) -> tuple[Import
             '--include-branches encloses them in all their positions'
         )
     if not flesh.capsules:
-        return found, [
-            *lines,
-            'shape: no collision geometry: each link is a bar from joint to joint',
-        ]
+        none = 'geometry' if options.geometry == 'visual' else 'collision geometry'
+        no_shape = f'shape: no {none}: each link is a bar from joint to joint'
+        if flesh.bare:
+            say('read_urdf', f'warning: {_seen(flesh.bare)}; links are bars of {found.radius:g} m')
+        return found, [*lines, no_shape]
     found = with_capsules(found, flesh.capsules, options.ray_radius or 0.0)
     always = colliding_pairs(found.arm)
     pairs = list(always)
     if options.srdf is not None:
-        named = disabled_pairs(options.srdf, found.arm)
+        named, strangers = disabled_pairs(options.srdf, found.arm, found.chain.name)
         known = {frozenset(pair) for pair in always}
         pairs += [pair for pair in named if frozenset(pair) not in known]
         lines.append(f'may meet, by {options.srdf.name}: {_listed(pairs[len(always) :])}')
+        if strangers:
+            some = ', '.join(strangers[:MOST_NAMED]) + (', ...' * (len(strangers) > MOST_NAMED))
+            count = f'{len(strangers)} link{"s" * (len(strangers) > 1)}'
+            lines.append(f'no part of the arm, but in {options.srdf.name}: {count}: {some}')
     if always:
         lines.append(f'may meet, since they nearly always do: {_listed(always)}')
     if flesh.bare:
-        lines.append(f'not checked, no collision geometry: {", ".join(flesh.bare)}')
+        lines.append(f'not checked: {_seen(flesh.bare)}')
     shape = [
         f'shape: {len(flesh.capsules)} capsules; slack: how far one reaches beyond the convex '
         'hull of what it encloses'
@@ -115,17 +180,12 @@ def _with_flesh(found: ImportedArm, options: argparse.Namespace) -> tuple[Import
     return replace(found, arm=replace(found.arm, allowed=tuple(pairs))), shape + lines
 
 
+def _seen(links: Sequence[str]) -> str:
+    return f'give --geometry visual to enclose what is only seen: {", ".join(links)}'
+
+
 def _listed(pairs: Sequence[tuple[str, str]]) -> str:
     return ', '.join(f'{one} and {other}' for one, other in pairs) or 'none'
-
-
-def _mount(numbers: Sequence[float] | None) -> Array:
-    if numbers is None:
-        return np.eye(4)
-    values = frozen_array(numbers, (7,), '--mount', 'm and -', ModelError)
-    if np.linalg.norm(values[3:]) < 1e-6:
-        raise ModelError('--mount: quaternion all zero, expected qx qy qz qw, not all 0 [-]')
-    return pose_matrix(values[:3], values[3:])
 
 
 def _report(found: ImportedArm) -> list[str]:
@@ -137,6 +197,10 @@ def _report(found: ImportedArm) -> list[str]:
         low, high = arm.bounds[:, k]
         note = f', {high / math.tau:g} turns either way' if arm.is_continuous[k] else ''
         radius = '' if arm.radii[k] == NO_BARS else f', radius {arm.radii[k]:.4f} m'
+        if not arm.is_continuous[k] and np.isfinite(soft_limits(chain.moving[k])).any():
+            limit = chain.moving[k].limit
+            hard = f'{limit.lower:g} to {limit.upper:g}'
+            note = f', within soft limits of safety_controller (limits {hard})'
         lines.append(f'  {name}: {low:.4f} to {high:.4f} {unit}{radius}{note}')
     lines.append(f'  ray: radius {arm.radii[-1]:.4f} m')
     if arm.radii[:-1].max() > found.radius:

@@ -16,6 +16,7 @@ from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.model.errors import ModelError, printable, shown
 from rrth_planner.model.rotation import pose_matrix, quaternion_xyzw
 
+POSE = ('position', 'quaternion_xyzw')
 LAYOUT = (
     'Modified Denavit-Hartenberg parameters (Craig), '
     'T = Rx(alpha) Tx(a) Rz(theta + offset) Tz(d).',
@@ -24,15 +25,21 @@ LAYOUT = (
     'type: revolute, prismatic, or continuous: it turns without a stop, so many times either way,',
     'for its cables, as max_turns says; 3 where there is none.',
     "tool: the frame after the last joint, whose pointing ray leaves along +z; mount: the arm's",
-    "base in the wearer's base frame, x forward, y left, z up.",
+    "base in the wearer's base frame, x forward, y left, z up; frame_0: where the first row and",
+    'the capsules of the mount begin, in the frame of the mount (without: there).',
 )
 
 # Of a continuous joint, either way from 0, where its file says nothing.
 MAX_TURNS = 3.0
 
 
-def arm_to_mapping(arm: ArmModel, name: str) -> dict[str, Any]:
-    """Return an arm as `arm_from_mapping` reads it."""
+def arm_to_mapping(arm: ArmModel, name: str, T_base_link: Array | None = None) -> dict[str, Any]:
+    """
+    Return an arm as `arm_from_mapping` reads it.
+
+    T_base_link: pose of the link that is mounted in the wearer's base frame, (4, 4) [m], where
+    that is not the frame in which the first row begins.
+    """
     rows = [dict(zip(ROW, row, strict=True)) for row in arm.dh.tolist()]
     (lower, upper), radii = arm.bounds.tolist(), arm.radii.tolist()
     joints = []
@@ -47,10 +54,9 @@ def arm_to_mapping(arm: ArmModel, name: str) -> dict[str, Any]:
         row = {'name': joint, 'type': kind, **rows[k], **limits, **radius}
         joints.append(row | _capsules_of(arm, k + 1))
     del rows[-1]['d']
-    mount = {
-        'position': _plain(arm.T_base_mount[:3, 3]),
-        'quaternion_xyzw': _plain(quaternion_xyzw(arm.T_base_mount[:3, :3])),
-    }
+    mount: dict[str, Any] = _pose(arm.T_base_mount if T_base_link is None else T_base_link)
+    if T_base_link is not None:
+        mount['frame_0'] = _pose(np.linalg.inv(T_base_link) @ arm.T_base_mount)
     result = {
         'name': name,
         'joints': joints,
@@ -78,6 +84,13 @@ def turn_bounds(max_turns: float, name: str = 'max_turns') -> Array:
     return math.tau * max_turns * np.array([[-1.0], [1.0]])
 
 
+def _pose(T: Array) -> dict[str, list[float]]:
+    return {
+        'position': _plain(T[:3, 3]),
+        'quaternion_xyzw': _plain(quaternion_xyzw(T[:3, :3])),
+    }
+
+
 def _kind(arm: ArmModel, k: int) -> str:
     if arm.is_continuous[k]:
         return 'continuous'
@@ -94,14 +107,17 @@ def _capsules_of(arm: ArmModel, link: int) -> dict[str, Any]:
     return {'capsules': found} if found else {}
 
 
-def arm_to_yaml(arm: ArmModel, name: str, comments: Sequence[str] = ()) -> str:
+def arm_to_yaml(
+    arm: ArmModel, name: str, comments: Sequence[str] = (), T_base_link: Array | None = None
+) -> str:
     """
     Return the text of an arm's file: comments, what the numbers mean, and a line a joint.
 
-    Rows, limits and radii are read from it to the bit, the mount to 1e-14.
+    T_base_link as of `arm_to_mapping`. Rows, limits and radii are read from it to the bit, the
+    mount to 1e-14.
     """
     lines = [f'# {" ".join(line.split())}\n' for line in (*comments, *LAYOUT)]
-    return ''.join(lines) + to_yaml(arm_to_mapping(arm, name), width=1000)
+    return ''.join(lines) + to_yaml(arm_to_mapping(arm, name, T_base_link), width=1000)
 
 
 def _plain(numbers: Array) -> list[float]:
@@ -110,9 +126,12 @@ def _plain(numbers: Array) -> list[float]:
     return plain
 
 
-def arm_from_mapping(data: Mapping[str, Any]) -> ArmModel:
+def arm_from_mapping(data: Mapping[str, Any], T_base_link: Array | None = None) -> ArmModel:
     """
     Return the arm that a mapping describes, laid out as in `config/arm.yaml`.
+
+    T_base_link: pose of what is mounted in the wearer's base frame, (4, 4) [m], if not the mount
+    of the mapping.
 
     Raises
     ------
@@ -126,14 +145,12 @@ def arm_from_mapping(data: Mapping[str, Any]) -> ArmModel:
     joints = [
         _joint(i, joint) for i, joint in enumerate(sequence(given['joints'], 'joints', ModelError))
     ]
-    pose = ('position', 'quaternion_xyzw')
-    mount = mapping(given['mount'], 'mount', pose, ModelError, ('capsules',))
-    position = frozen_array(mount['position'], (3,), 'mount position', 'm', ModelError)
-    quaternion = frozen_array(
-        mount['quaternion_xyzw'], (4,), 'mount quaternion_xyzw', '-', ModelError, FARTHEST
-    )
-    if np.linalg.norm(quaternion) < 1e-6:
-        raise ModelError('mount quaternion_xyzw: all zero, expected a unit quaternion [-]')
+    mount = mapping(given['mount'], 'mount', POSE, ModelError, ('frame_0', 'capsules'))
+    T_base_mount = _placed(mount, 'mount') if T_base_link is None else T_base_link
+    if 'frame_0' in mount:
+        label = 'mount frame_0'
+        frame_0 = mapping(mount['frame_0'], label, POSE, ModelError)
+        T_base_mount = T_base_mount @ _placed(frame_0, label)
     rows = [*joints, _tool(given['tool'])]
     capsules = [
         capsule
@@ -148,11 +165,22 @@ def arm_from_mapping(data: Mapping[str, Any]) -> ArmModel:
         dh=np.array([[row[key] for key in ROW] for row in rows]),
         bounds=np.array([[joint[key] for joint in joints] for key in ('lower', 'upper')]),
         radii=np.array([row.get('radius', unsaid) for row in joints] + [rows[-1]['radius']]),
-        T_base_mount=pose_matrix(position, quaternion),
+        T_base_mount=T_base_mount,
         capsules=tuple(capsules),
         allowed=_allowed(given.get('allowed', [])),
         is_continuous=tuple(joint['type'] == 'continuous' for joint in joints),
     )
+
+
+def _placed(given: Mapping[str, Any], label: str) -> Array:
+    """Return a pose, (4, 4) [m], or raise ModelError."""
+    position = frozen_array(given['position'], (3,), f'{label} position', 'm', ModelError)
+    quaternion = frozen_array(
+        given['quaternion_xyzw'], (4,), f'{label} quaternion_xyzw', '-', ModelError, FARTHEST
+    )
+    if np.linalg.norm(quaternion) < 1e-6:
+        raise ModelError(f'{label} quaternion_xyzw: all zero, expected a unit quaternion [-]')
+    return pose_matrix(position, quaternion)
 
 
 def _allowed(data: Any) -> tuple[tuple[str, str], ...]:
@@ -227,9 +255,11 @@ def _numbers(given: Mapping[str, Any], label: str, units: Mapping[str, str]) -> 
     }
 
 
-def load_arm(path: str | Path | None = None) -> ArmModel:
+def load_arm(path: str | Path | None = None, T_base_link: Array | None = None) -> ArmModel:
     """
     Return the arm that a YAML file describes; None or empty: the packaged one, `config/arm.yaml`.
+
+    T_base_link as of `arm_from_mapping`.
 
     Raises
     ------
@@ -238,10 +268,10 @@ def load_arm(path: str | Path | None = None) -> ArmModel:
 
     """
     file = Path(path) if path else resource_path('config/arm.yaml')
-    return arm_from_text(read_text(file), file)
+    return arm_from_text(read_text(file), file, T_base_link)
 
 
-def arm_from_text(text: str, file: str | Path) -> ArmModel:
+def arm_from_text(text: str, file: str | Path, T_base_link: Array | None = None) -> ArmModel:
     """Return the arm that the text of a YAML file describes, as `load_arm` does."""
     if text.lstrip().startswith('<'):
         raise ModelError(
@@ -250,4 +280,4 @@ def arm_from_text(text: str, file: str | Path) -> ArmModel:
         )
     data = parse_yaml(text, f'file {file}')
     with naming_file(file, ModelError):
-        return arm_from_mapping(data)
+        return arm_from_mapping(data, T_base_link)

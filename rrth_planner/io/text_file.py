@@ -213,10 +213,28 @@ def load_xml(path: str | Path) -> ElementTree.Element:
 
 def parse_xml(data: bytes, name: str) -> ElementTree.Element:
     """Return the root of XML, as `load_xml` does; name: what sentences call it."""
-    parser = ElementTree.XMLParser(target=_Tree())
     try:
-        parser.feed(data)
-        root: ElementTree.Element = parser.close()
+        try:
+            root = _root_of(data)
+        except ElementTree.ParseError as problem:
+            if 'unbound prefix' not in str(problem):
+                raise
+            root = _root_of(_with_prefixes(data))
     except (SyntaxError, LookupError, ValueError) as problem:
         raise ModelError(f'{name}: {problem}; expected a readable XML file') from problem
     return root
+
+
+def _root_of(data: bytes) -> ElementTree.Element:
+    parser = ElementTree.XMLParser(target=_Tree())
+    parser.feed(data)
+    root: ElementTree.Element = parser.close()
+    return root
+
+
+def _with_prefixes(data: bytes) -> bytes:
+    """Return XML with the prefixes declared that it uses without: TinyXML asks for none."""
+    used = dict.fromkeys(re.findall(rb'[<\s]([A-Za-z_][\w.-]*):[A-Za-z_]', data))
+    declared = set(re.findall(rb'xmlns:([\w.-]+)', data)) | {b'xml', b'xmlns'}
+    new = b''.join(b' xmlns:%b="%b"' % (name, name) for name in used if name not in declared)
+    return re.sub(rb'<([A-Za-z_][\w.-]*)', rb'<\1' + new, data, count=1)

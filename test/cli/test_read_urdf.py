@@ -202,7 +202,7 @@ CHAINS = {
         LAST,
     ],
     'no joint moves': [joint('a', 'fixed', 'base', 'tool')],
-    'give --tool LINK': [LAST, joint('b', 'fixed', 'l1', 'other')],
+    'give --tool LINK': [LAST, joint('b', 'revolute', 'l1', 'other', **TURN)],
     'give --base LINK': [LAST, joint('b', 'fixed', 'base', 'other')],
     'expected a tree': [LAST, joint('b', 'fixed', 'base', 'tool')],
 }  # fmt: skip
@@ -212,7 +212,7 @@ TEXTS = {
     'readable XML (.*': 'joints: [1, 2]\n',
     'no URDF [(].*': '<robot name="a"><link name="b"/><joint name="c" type="revolute"/></robot>',
     'readable XML [(].*[)]': '',
-    'expected one: give --base': '<robot name="a"/>',
+    'expected one, the root': '<robot name="a"/>',
     **{words: urdf(joints) for words, joints in CHAINS.items()},
 }
 

@@ -27,8 +27,8 @@ from rrth_planner.io.urdf.chain import read_chain
 from rrth_planner.io.urdf.export import arm_to_urdf
 from rrth_planner.io.urdf.geometry import (
     box_triangles,
-    collision_triangles,
     cylinder_triangles,
+    link_triangles,
     mesh_file,
     sphere_triangles,
 )
@@ -130,7 +130,7 @@ def assert_enclosed(found, file, include_branches, n=20):
     model = yourdfpy.URDF.load(str(file), load_meshes=False, build_scene_graph=True)
     arm, chain = found.arm, found.chain
     shapes = {
-        link.name: np.concatenate(collision_triangles(link, file))
+        link.name: np.concatenate(link_triangles(link, file))
         for link in model.robot.links
         if link.collisions
     }
@@ -235,7 +235,7 @@ def test_meshes_are_found_where_the_urdf_says(tmp_path, monkeypatch):
     [
         (
             '<mesh filename="package://none/other.stl"/>',
-            'no mesh .package://none/other.stl. in or above .*ROS_PACKAGE_PATH.*.none. may be',
+            'set ROS_PACKAGE_PATH to the folder .*"none": .*no mesh .package://none/other.stl. in',
         ),
         ('<mesh filename="http://a/part.stl"/>', 'expected a file, or package'),
         ('<mesh/>', 'no file name'),
@@ -256,8 +256,9 @@ def test_what_cannot_be_read_is_said_in_a_sentence(tmp_path, shape, words):
     (tmp_path / 'broken.stl').write_bytes(stl(TETRAHEDRON)[:100])
     (tmp_path / 'empty.stl').write_bytes(stl(TETRAHEDRON[:0]))
     (tmp_path / 'nan.stl').write_bytes(stl(np.full((1, 3, 3), np.nan)))
-    with pytest.raises(ModelError, match=f'link "upper": collision geometry 0.*({words})'):
+    with pytest.raises(ModelError, match=f'({words})') as problem:
         imported(file)
+    assert 'link "upper": collision geometry 0' in str(problem.value)
 
 
 def test_branches_that_cannot_be_followed_are_said(tmp_path):
@@ -284,7 +285,7 @@ def test_the_unit_of_a_collada_file_counts(tmp_path):
         shape = collision('<mesh filename="part.dae"/>')
         file = urdf_file(tmp_path, {**LINKS, 'upper': shape})
         (link,) = [x for x in read_chain(file, None, 'tool').robot.links if x.name == 'upper']
-        sizes.append(collision_triangles(link, file)[0].max())
+        sizes.append(link_triangles(link, file)[0].max())
     assert sizes == pytest.approx([0.3, 0.0003])
 
 
@@ -396,11 +397,14 @@ def test_an_srdf_names_pairs_that_may_touch(tmp_path):
     file = tmp_path / 'arm.srdf'
     lines = ''.join(f'<disable_collisions link1="{a}" link2="{b}"/>' for a, b in pairs)
     file.write_text(f'<robot name="r">{lines}</robot>')
-    assert disabled_pairs(file, three_joints()) == (('ball 1', 'ball 3'),)
-    for text, words in (('<sdf/>', 'an SRDF'), ('<robot><disable_collisions/></robot>', 'link1')):
+    assert disabled_pairs(file, three_joints(), 'r') == ((('ball 1', 'ball 3'),), ['wheel'])
+    for text, words in (
+        ('<sdf/>', 'an SRDF'),
+        ('<robot name="r"><disable_collisions/></robot>', 'link1'),
+    ):
         file.write_text(text)
         with pytest.raises(ModelError, match=words):
-            disabled_pairs(file, three_joints())
+            disabled_pairs(file, three_joints(), 'r')
 
 
 @pytest.mark.skipif(ROBOTS is None, reason='example-robot-data is not there')

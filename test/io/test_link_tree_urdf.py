@@ -43,7 +43,7 @@ def test_links_are_where_yourdfpy_has_them():
     [
         ('<robot', '<body', 'robot_description: .*readable XML'),
         ('type="fixed"', 'type="floating"', 'floating, expected one of revolute'),
-        ('0 0 0.5', '0 0 nan', 'robot_description: origin: xyz.*finite numbers'),
+        ('0 0 0.5', '0 0 nan', 'robot_description: origin of joint .*: xyz.*finite numbers'),
         ('<axis xyz="0 1 0"/>', '<axis xyz="0 0 0"/>', 'axis .*not all 0'),
         ('<parent link="waist_', '<parent link="waste_', 'no parent "waste", expected a link'),
         ('<child link="torso_', '<child link="waist_', 'expected a tree of links'),

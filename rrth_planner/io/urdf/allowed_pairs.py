@@ -74,21 +74,37 @@ def _collide(bars: tuple[Bar, ...], ends: Array, places: list[tuple[int, int]]) 
     return result
 
 
-def disabled_pairs(file: Path, arm: ArmModel) -> tuple[Pair, ...]:
+def disabled_pairs(file: Path, arm: ArmModel, robot: str) -> tuple[tuple[Pair, ...], list[str]]:
     """
     Return the pairs of an arm's parts that an SRDF lets collide: disable_collisions of two links.
+
+    Parameters
+    ----------
+    robot : str
+        What the URDF calls the robot.
+
+    Returns
+    -------
+    pairs : tuple of (str, str)
+    strangers : list of str
+        Links that it names and that are no parts of the arm.
 
     Raises
     ------
     ModelError
-        No SRDF, or a pair without two names.
+        No SRDF, that of another robot, or a pair without two names.
 
     """
     root = load_xml(file)
     if root.tag != 'robot':
         raise ModelError(f'file {file}: <{root.tag}>, expected an SRDF, which is a <robot>')
+    if root.get('name') != robot:
+        raise ModelError(
+            f'give the SRDF of robot {shown(robot)}, as the URDF calls it: file {file} is that of '
+            f'{shown(root.get("name"))}'
+        )
     body = {bar.name: bar.body for bar in (*bars_of(arm), *mount_bars(arm))}
-    found = []
+    found, strangers = [], []
     for element in root.iter('disable_collisions'):
         names = element.get('link1'), element.get('link2')
         one, other = names
@@ -96,6 +112,7 @@ def disabled_pairs(file: Path, arm: ArmModel) -> tuple[Pair, ...]:
             raise ModelError(
                 f'file {file}: disable_collisions of {shown(names)}, expected link1 and link2'
             )
+        strangers += [name for name in (one, other) if name not in body]
         if one in body and other in body and abs(body[one] - body[other]) > 1:
             found.append((one, other))
-    return tuple(dict.fromkeys(found))
+    return tuple(dict.fromkeys(found)), list(dict.fromkeys(strangers))

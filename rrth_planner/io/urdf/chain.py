@@ -14,8 +14,10 @@ from xml.etree import ElementTree
 import numpy as np
 from rrth_planner.io.extras import require
 from rrth_planner.io.text_file import load_xml
+from rrth_planner.io.urdf.tool_link import only_tool, reject_jaw
+from rrth_planner.io.urdf.version_1_0 import say_in_version_1_0
 from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
-from rrth_planner.model.errors import ModelError, printable
+from rrth_planner.model.errors import ModelError, printable, shown
 
 # colcon does not install them; an error says so when a file is read.
 with suppress(ImportError):
@@ -98,7 +100,12 @@ class UrdfChain:
 
 
 def read_chain(
-    path: str | Path, base: str | None = None, tool: str | None = None, ray: str = '+z'
+    path: str | Path,
+    base: str | None = None,
+    tool: str | None = None,
+    ray: str = '+z',
+    *,
+    takes_jaw: bool = True,
 ) -> UrdfChain:
     """
     Return the chain of a URDF file, whose meshes are not looked for.
@@ -109,6 +116,8 @@ def read_chain(
         The links that it leads from and to: the root and, where there is only one, the last link.
     ray : str
         Which axis of the tool's link is the pointing ray: +x, -x, +y, -y, +z or -z.
+    takes_jaw : bool
+        Whether the tool may be what looks like the jaw of a gripper.
 
     Raises
     ------
@@ -120,7 +129,7 @@ def read_chain(
     if ray not in RAYS:
         raise ModelError(f'ray: {ray!r}, expected one of +x, -x, +y, -y, +z, -z')
     model = urdf_model(load_xml(path), f'file {path}')
-    joints, base, tool = _between(model, base, tool)
+    joints, base, tool = _between(model, base, tool, takes_jaw)
     T, frames, moving = np.eye(4), [], []
     for joint in joints:
         if joint.origin is not None:
@@ -153,13 +162,8 @@ def read_chain(
 def urdf_model(root: ElementTree.Element, label: str) -> Any:
     """Return the robot of a URDF without meshes, or raise ModelError naming it by a label."""
     logging.getLogger('yourdfpy').setLevel(logging.CRITICAL)
-    # Strictly, where yourdfpy would make something of any file.
-    if any('xacro' in element.tag for element in root.iter()):
-        raise ModelError(f'{label}: a xacro file, expected a URDF (xacro FILE > arm.urdf)')
-    for origin in root.iter('origin'):
-        _check_origin(origin, f'{label}: origin')
+    text = urdf_text(root, label)
     try:
-        text = io.BytesIO(ElementTree.tostring(root))
         model = yourdfpy.URDF.load(text, build_scene_graph=False, load_meshes=False)
     except NO_URDF as problem:
         said = ' '.join(f'{type(problem).__name__}: {problem}'.split())
@@ -169,19 +173,18 @@ def urdf_model(root: ElementTree.Element, label: str) -> Any:
     return model
 
 
-def _check_origin(origin: ElementTree.Element, label: str) -> None:
-    """Reject anything but three finite numbers: the parser would accept and change others."""
-    for name in ('xyz', 'rpy'):
-        given = origin.get(name, '0 0 0')
-        try:
-            numbers = [float(word) for word in given.split()]
-        except ValueError as problem:
-            raise ModelError(f'{label}: {name}="{given}", expected three numbers') from problem
-        unit = 'm' if name == 'xyz' else 'rad'
-        frozen_array(numbers, (3,), f'{label}: {name}', unit, ModelError, FARTHEST)
+def urdf_text(root: ElementTree.Element, label: str) -> io.BytesIO:
+    """Return a URDF as yourdfpy reads it, or raise ModelError naming it by a label."""
+    # Strictly, where yourdfpy would make something of any file.
+    if any('xacro' in element.tag for element in root.iter()):
+        raise ModelError(f'{label}: a xacro file, expected a URDF (xacro FILE > arm.urdf)')
+    say_in_version_1_0(root, label)
+    return io.BytesIO(ElementTree.tostring(root))
 
 
-def _between(model: Any, base: str | None, tool: str | None) -> tuple[list[Any], str, str]:
+def _between(
+    model: Any, base: str | None, tool: str | None, takes_jaw: bool
+) -> tuple[list[Any], str, str]:
     """Return the joints that lead from one link to another, and the two links."""
     links = {link.name: link for link in model.robot.links}
     above = {joint.child: joint for joint in model.robot.joints}
@@ -191,19 +194,21 @@ def _between(model: Any, base: str | None, tool: str | None) -> tuple[list[Any],
             if link not in links:
                 raise ModelError(
                     f'joint "{joint.name}": its {which} link "{link}" is not declared, expected '
-                    f'one of {list(links)}'
+                    f'one of {shown(list(links))}'
                 )
     if len(above) < len(model.robot.joints):
         raise ModelError('URDF: two joints lead to the same link, expected a tree of links')
     if base is None:
-        base = _only([link for link in links if link not in above], 'base')
-    if tool is None:
-        tool = _only([link for link in links if link not in parents], 'tool')
+        base = _root([link for link in links if link not in above])
+    if tool is None and base in links:
+        ends = [link for link in links if link not in parents]
+        tool = only_tool(model.robot, base, ends, takes_jaw)
     for option, link in (('base', base), ('tool', tool)):
         if link not in links:
             raise ModelError(
-                f'--{option} {link}: no link of the URDF, expected one of {list(links)}'
+                f'--{option} {link}: no link of the URDF, expected one of {shown(list(links))}'
             )
+    assert tool is not None
     joints: list[Any] = []
     link = tool
     while link != base:
@@ -211,6 +216,8 @@ def _between(model: Any, base: str | None, tool: str | None) -> tuple[list[Any],
             raise ModelError(f'links "{base}" and "{tool}": no chain of joints from first to last')
         joints.insert(0, above[link])
         link = joints[0].parent
+    if not takes_jaw:
+        reject_jaw(model.robot, joints, tool)
     for joint in joints:
         if joint.type not in ('revolute', 'continuous', 'prismatic', 'fixed'):
             raise ModelError(
@@ -225,9 +232,13 @@ def _between(model: Any, base: str | None, tool: str | None) -> tuple[list[Any],
     return joints, base, tool
 
 
-def _only(links: list[str], option: str) -> str:
-    if len(links) != 1:
-        raise ModelError(f'URDF: {links} may be the {option}, expected one: give --{option} LINK')
+def _root(links: list[str]) -> str:
+    if not links:
+        raise ModelError('URDF: no link to which no joint leads, expected one, the root')
+    if len(links) > 1:
+        raise ModelError(
+            f'give --base LINK: no joint leads to {len(links)} links, {shown(links)}, expected one'
+        )
     return links[0]
 
 
@@ -261,7 +272,39 @@ def joint_limits(joint: Any) -> tuple[float, float]:
             f'joint "{joint.name}": limits {limit.lower} and {limit.upper}, expected '
             f'lower < upper [{unit}]'
         )
-    return limit.lower, limit.upper
+    soft_lower, soft_upper = soft_limits(joint)
+    lower, upper = max(limit.lower, soft_lower), min(limit.upper, soft_upper)
+    if not lower < upper:
+        raise ModelError(
+            f'joint "{joint.name}": soft limits {soft_lower} and {soft_upper} of '
+            f'safety_controller, expected a range within its limits, {limit.lower} to '
+            f'{limit.upper} [{unit}]'
+        )
+    return lower, upper
+
+
+def soft_limits(joint: Any) -> tuple[float, float]:
+    """
+    Return between which positions a safety_controller keeps a joint [rad or m].
+
+    +-inf where it does not. Both 0 is what URDF 1.0 takes where none are given.
+    """
+    given = joint.safety_controller
+    if given is None or not (given.soft_lower_limit or given.soft_upper_limit):
+        return -math.inf, math.inf
+    lower, upper = (
+        end if value is None else value
+        for value, end in (
+            (given.soft_lower_limit, -math.inf),
+            (given.soft_upper_limit, math.inf),
+        )
+    )
+    if math.isnan(lower) or math.isnan(upper):
+        raise ModelError(
+            f'joint "{joint.name}": soft limits {lower} and {upper} of safety_controller, '
+            'expected numbers [rad or m]'
+        )
+    return lower, upper
 
 
 def squared(T: Array) -> Array:

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The collision geometry of a link of a URDF, as triangles."""
+"""The geometry of a link of a URDF, as triangles."""
 
 from contextlib import suppress
 import os
@@ -25,9 +25,18 @@ MOST_TRIANGLES = 2_000_000
 N_SIDES = 64
 
 
-def collision_triangles(link: Any, file: Path) -> tuple[Array, ...]:
+def parts_of(link: Any, geometry: str) -> list[Any]:
     """
-    Return the surfaces that collide of a link, in its own frame, (n, 3, 3) each [m].
+    Return what a link is enclosed by: its collisions or, with `visual`, what is seen of it.
+
+    With `visual`, a link that is not seen has its collisions.
+    """
+    return list((geometry == 'visual' and link.visuals) or link.collisions)
+
+
+def link_triangles(link: Any, file: Path, geometry: str = 'collision') -> tuple[Array, ...]:
+    """
+    Return the surfaces of a link, in its own frame, (n, 3, 3) each [m].
 
     Cylinders and spheres are polyhedra around them.
 
@@ -37,6 +46,8 @@ def collision_triangles(link: Any, file: Path) -> tuple[Array, ...]:
         With what the file says of it.
     file : Path
         The URDF: names of mesh files begin at its folder, packages at a folder above.
+    geometry : str
+        Which surfaces: collision or visual, as in `parts_of`.
 
     Raises
     ------
@@ -45,10 +56,10 @@ def collision_triangles(link: Any, file: Path) -> tuple[Array, ...]:
 
     """
     found = []
-    for k, collision in enumerate(link.collisions):
-        label = f'link "{link.name}": collision geometry {k}'
-        T = np.eye(4) if collision.origin is None else np.asarray(collision.origin)
-        triangles = _triangles(collision.geometry, file, label)
+    for k, part in enumerate(parts_of(link, geometry)):
+        label = f'link "{link.name}": {geometry} geometry {k}'
+        T = np.eye(4) if part.origin is None else np.asarray(part.origin)
+        triangles = _triangles(part.geometry, file, label)
         found.append(np.asarray(triangles @ T[:3, :3].T + T[:3, 3]))
     return tuple(found)
 
@@ -56,7 +67,7 @@ def collision_triangles(link: Any, file: Path) -> tuple[Array, ...]:
 def _triangles(geometry: Any, file: Path, label: str) -> Array:
     """Return the surface of a geometry in its own frame, (n, 3, 3) [m]."""
     if geometry is None:
-        raise ModelError(f'{label}: nothing, expected a box, cylinder, sphere or mesh')
+        raise ModelError(f'{label}: nothing, expected a box, capsule, cylinder, sphere or mesh')
     if geometry.box is not None:
         return box_triangles(_sizes(geometry.box.size, (3,), f'{label}: size of the box'))
     if geometry.cylinder is not None:
@@ -138,13 +149,12 @@ def mesh_file(name: str, file: Path, label: str) -> Path:
         with suppress(OSError, ValueError):
             if path.is_file():
                 return path
-    where = f'at {folder}'
     if scheme in ('package', 'model'):
-        where = (
-            f'in or above {folder}, nor in a folder of the variable ROS_PACKAGE_PATH, where the '
-            f'folder "{rest.partition("/")[0]}" may be'
+        raise ModelError(
+            f'set ROS_PACKAGE_PATH to the folder that has the folder "{rest.partition("/")[0]}": '
+            f'{label}: no mesh "{name}" in or above {folder}'
         )
-    raise ModelError(f'{label}: no mesh "{name}" {where}; expected a file')
+    raise ModelError(f'{label}: no mesh "{name}" at {folder}; expected a file')
 
 
 def _paths(variable: str) -> list[Path]:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The links of a URDF as capsules of the arm that its chain is."""
 
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Callable, Container, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
 import math
@@ -12,7 +12,7 @@ import numpy as np
 from rrth_planner.io.urdf.allowed_pairs import collision_shares
 from rrth_planner.io.urdf.capsules import cost_of, enclosing_capsules, Fit, uncovered
 from rrth_planner.io.urdf.chain import joint_limits, joint_motion, squared, UrdfChain
-from rrth_planner.io.urdf.geometry import collision_triangles
+from rrth_planner.io.urdf.geometry import link_triangles, parts_of
 from rrth_planner.io.urdf.import_chain import ImportedArm, with_capsules
 from rrth_planner.model.arm import Capsule, forward_kinematics
 from rrth_planner.model.arrays import Array
@@ -83,11 +83,11 @@ class Flesh:
     Parameters
     ----------
     links : tuple of EnclosedLink
-        Those with collision geometry.
+        Those with geometry.
     bare : tuple of str
         Links between base and tool that are only seen.
     left_out : tuple of str
-        Links with collision geometry that joints beside the chain move.
+        Links with geometry that joints beside the chain move.
 
     """
 
@@ -101,9 +101,18 @@ class Flesh:
         return tuple(capsule for link in self.links for capsule in link.capsules)
 
 
-def enclose_links(found: ImportedArm, include_branches: bool = False) -> Flesh:
+def _silent(_: str) -> None:
+    """Tell nobody which link is being enclosed."""
+
+
+def enclose_links(
+    found: ImportedArm,
+    include_branches: bool = False,
+    geometry: str = 'collision',
+    on_link: Callable[[str], None] = _silent,
+) -> Flesh:
     """
-    Return capsules that enclose the collision geometry of an arm's links.
+    Return capsules that enclose the geometry of an arm's links.
 
     Of the links from the chain's first one outwards: those of the chain and those fixed to them.
     Links that often collide with each other are enclosed more closely, where that helps.
@@ -113,6 +122,10 @@ def enclose_links(found: ImportedArm, include_branches: bool = False) -> Flesh:
     include_branches : bool
         Whether links that joints beside the chain move, as fingers, are enclosed in all positions
         of these joints, or left out.
+    geometry : str
+        What is enclosed: collision or visual, as in `geometry.parts_of`.
+    on_link : callable
+        Called with the name of each link before it is enclosed.
 
     Raises
     ------
@@ -121,12 +134,18 @@ def enclose_links(found: ImportedArm, include_branches: bool = False) -> Flesh:
         moves otherwise; what reads it is missing.
 
     """
-    usual = _enclose(found, include_branches, {})
-    closer = _closer_fits(found, usual, include_branches)
-    return _enclose(found, include_branches, closer) if closer else usual
+
+    def enclose(fits: Mapping[str, Fit], names: Container[str] | None = None) -> Flesh:
+        return _enclose(found, include_branches, geometry, on_link, fits, names)
+
+    usual = enclose({})
+    closer = _closer_fits(found, usual, enclose)
+    return enclose(closer) if closer else usual
 
 
-def _closer_fits(found: ImportedArm, usual: Flesh, include_branches: bool) -> dict[str, Fit]:
+def _closer_fits(
+    found: ImportedArm, usual: Flesh, enclose: Callable[..., Flesh]
+) -> dict[str, Fit]:
     """Return which links of an arm are to be enclosed more closely, and how."""
     if not usual.capsules:
         return {}
@@ -139,9 +158,7 @@ def _closer_fits(found: ImportedArm, usual: Flesh, include_branches: bool) -> di
     fits: dict[str, Fit] = {}
     if not names:
         return fits
-    tried = {USUAL: usual} | {
-        fit: _enclose(found, include_branches, dict.fromkeys(names, fit), names) for fit in CLOSER
-    }
+    tried = {USUAL: usual} | {fit: enclose(dict.fromkeys(names, fit), names) for fit in CLOSER}
     for pair, share in sorted(often.items(), key=lambda item: -item[1]):
         if pair[0] in fits or pair[1] in fits:
             continue
@@ -165,8 +182,10 @@ def _closer_fits(found: ImportedArm, usual: Flesh, include_branches: bool) -> di
 def _enclose(
     found: ImportedArm,
     include_branches: bool,
+    geometry: str,
+    on_link: Callable[[str], None],
     fits: Mapping[str, Fit],
-    names: Container[str] | None = None,
+    names: Container[str] | None,
 ) -> Flesh:
     """Return capsules around an arm's links, or those named; fits: of those that are not usual."""
     chain, arm = found.chain, found.arm
@@ -178,13 +197,14 @@ def _enclose(
         name = placed.link.name
         if names is not None and name not in names:
             continue
-        if not placed.link.collisions:
+        if not parts_of(placed.link, geometry):
             bare += [name] if name in on_chain and placed.link.visuals else []
             continue
         if placed.is_moved and not include_branches:
             left_out.append(name)
             continue
-        surfaces = collision_triangles(placed.link, chain.file)
+        on_link(name)
+        surfaces = link_triangles(placed.link, chain.file, geometry)
         poses = np.linalg.inv(frames[placed.body]) @ found.T_base_link @ placed.poses
         beside = [
             capsule

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from rrth_planner.io.extras import require
 from rrth_planner.io.text_file import load_xml
-from rrth_planner.io.urdf.chain import NO_URDF, read_chain, TOOLS, urdf_model, UrdfChain
+from rrth_planner.io.urdf.chain import NO_URDF, read_chain, TOOLS, urdf_model, urdf_text, UrdfChain
 from rrth_planner.io.urdf.geometry import mesh_file
 from rrth_planner.model.arm import ArmModel, forward_kinematics
 from rrth_planner.model.arrays import Array
@@ -121,9 +121,10 @@ def place_chain(file: Path, arm: ArmModel) -> tuple[UrdfChain, Array]:
 def _with_meshes(file: Path) -> Any:
     """Return the robot of a file with the meshes of its links, or raise ModelError."""
     logging.getLogger('yourdfpy').setLevel(logging.CRITICAL)
+    text = urdf_text(load_xml(file), f'file {file}')
     try:
         return yourdfpy.URDF.load(
-            str(file),
+            text,
             build_scene_graph=True,
             load_meshes=True,
             filename_handler=lambda fname: str(mesh_file(fname, file, 'mesh')),
