@@ -102,7 +102,7 @@ class Flesh:
 
 
 def _silent(_: str) -> None:
-    """Tell nobody which link is being enclosed."""
+    """Report no link that is being enclosed."""
 
 
 def enclose_links(

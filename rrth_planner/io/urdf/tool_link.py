@@ -10,7 +10,7 @@ from rrth_planner.model.errors import ModelError, shown
 
 # What jaws, and the joints that move them, are called.
 JAW = re.compile(r'finger|thumb|jaw|claw|pincer|knuckle', re.IGNORECASE)
-JAW_JOINT = re.compile(rf'{JAW.pattern}|grip', re.IGNORECASE)
+JAW_JOINT = re.compile(rf'{JAW.pattern}|gripp|clamp', re.IGNORECASE)
 # A joint called so carries the gripper as a whole.
 WRIST = re.compile(r'wrist|roll|pitch|yaw|rot|flex', re.IGNORECASE)
 # A gripper is carried by at least so many joints, and a jaw is moved by at most so many.
