@@ -8,7 +8,6 @@ from pathlib import Path
 
 from rrth_planner.cli.numbers import integer, number
 from rrth_planner.cli.program import command_parser
-from rrth_planner.wearer.skeleton import STATURES
 
 # What `record` records: all topics of a planner and an arm, with their types.
 TOPICS = {
@@ -186,7 +185,7 @@ def wearer() -> argparse.ArgumentParser:
         '--stature',
         type=number('m'),
         nargs='+',
-        default=STATURES,
+        default=(1.4, 2.0),
         metavar='M',
         help='of the person, or of the smallest and the largest one [m] (1.4 2.0)',
     )
