@@ -102,7 +102,7 @@ class BodyBoxesNode(Node):
         stamp = Time(nanoseconds=tracked.stamp).to_msg()
         frame = own or settings.base_frame
         msg = self._markers.message(scene, frame, stamp)
-        T = base_pose(settings.skeleton, plausible.posture)
+        T = base_pose(settings.skeleton, self._before.posture)
         others = {k: (points - T[:3, 3]) @ T[:3, :3] for k, points in tracked.others.items()}
         msg.markers.extend(self._others.markers(others, frame, stamp, measured))
         return msg, lost, plausible.doubts

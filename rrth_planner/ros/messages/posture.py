@@ -21,8 +21,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 # The id of a marker is so many times the number of the person, and the number of the joint.
 IDS_OF_PERSON = 100
-# Of zed_msgs/Object: the keypoints of each body_format, the states of tracking in which a person is
-# where the message says, or is only guessed to be there, and the greatest confidence.
+# Of zed_msgs/Object: the keypoints of each body_format, the states of tracking in which a person
+# is where the message says, or is only guessed to be there, and the greatest confidence.
 BODY_FORMATS = (18, 34, 38, 70)
 TRACKED, SEARCHED = 1, 2
 MOST_CONFIDENCE = 100.0
@@ -55,7 +55,8 @@ def posture_from_markers(
     Return the points of a person, SPHERE markers with the id `100 person + joint`.
 
     A marker whose text is one of the names is that joint, whatever its id says of it. The alpha of
-    its colour is its confidence. Other markers are ignored. Of stamps that differ, the oldest counts, of those that are set.
+    its colour is its confidence. Other markers are ignored. Of stamps that differ, the oldest
+    counts, of those that are set.
 
     Parameters
     ----------
