@@ -22,8 +22,8 @@ import tempfile
 import numpy as np
 import pytest
 
-# By package and file: of https://github.com/ros-controls/control_msgs (BSD-3-Clause), branch jazzy;
-# the fields of https://github.com/stereolabs/zed-ros2-interfaces, and those of
+# By package and file: control_msgs of https://github.com/ros-controls (BSD-3-Clause), the fields
+# of zed_msgs of https://github.com/stereolabs/zed-ros2-interfaces, and those of
 # https://github.com/MOCAP4ROS2-Project/mocap4r2_msgs (both Apache-2.0).
 DEFINITIONS = {
     'control_msgs': {
