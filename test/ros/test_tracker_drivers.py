@@ -4,6 +4,7 @@
 
 from contextlib import ExitStack
 import os
+import sys
 
 import message_packages
 import numpy as np
@@ -291,19 +292,19 @@ def test_others_are_boxes_and_a_change_of_person_needs_a_reset():
     scene.destroy_node()
 
 
-def test_without_the_package_of_its_messages_an_input_says_so(call, monkeypatch):
+@pytest.mark.parametrize(
+    ('name', 'package'), [('zed', 'zed_msgs'), ('rigid_bodies', 'mocap4r2_msgs')]
+)
+def test_without_the_package_of_its_messages_an_input_says_so(name, package, call, monkeypatch):
     from rrth_planner.ros import body_boxes_node
-    from rrth_planner.ros.interface import posture_inputs
 
-    for name, kind, package in (
-        ('zed', 'ObjectsStamped', 'zed_msgs'),
-        ('rigid_bodies', 'RigidBodies', 'mocap4r2_msgs'),
-    ):
-        monkeypatch.setattr(posture_inputs, kind, None)
-        options = ['-p', f'input:={name}']
-        ended = call(body_boxes_node.main, '--ros-args', *options)
-        assert ended.returncode == 1
-        assert f'input: {name}, expected where the package {package} is inst' in ended.stderr
+    for module in (package, f'{package}.msg'):
+        monkeypatch.setitem(sys.modules, module, None)
+    options = ['-p', f'input:={name}']
+    ended = call(body_boxes_node.main, '--ros-args', *options)
+    assert ended.returncode == 1
+    assert f'input {name}: expected where the package {package} is inst' in ended.stderr
+    assert len(ended.stderr.splitlines()) == 1, ended.stderr
 
 
 @pytest.mark.parametrize(

@@ -11,16 +11,18 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rrth_planner.io.skeleton_file import load_skeleton
-from rrth_planner.model.errors import OptionsError
+from rrth_planner.ros.messages.definitions import require_type, type_of_name
 from rrth_planner.ros.messages.posture import BODY_FORMATS, IDS_OF_PERSON, TRACKED
 from rrth_planner.ros.messages.tracked_person import points_to_msg, poses_to_msg
-from rrth_planner.ros.messages.tracker_types import ObjectsStamped, RigidBodies
 from rrth_planner.wearer.posture import Posture
 from rrth_planner.wearer.skeleton import Skeleton
 from rrth_planner.wearer.stand_in import stand_in
 from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
 
+# The types of messages, by the inputs of body_boxes_node; those of packages beside ROS by name.
+KINDS = {'markers': MarkerArray, 'poses': PoseArray, 'bodies': PoseStamped}
+PACKAGED = {'zed': 'zed_msgs/msg/ObjectsStamped', 'rigid_bodies': 'mocap4r2_msgs/msg/RigidBodies'}
 # What the drivers say of a person who is well seen [0 to 100], and his number.
 CONFIDENCE, NUMBER = 90.0, 1
 
@@ -95,17 +97,8 @@ class StandInPublisher(Node):
 
         """
         self._driver = DRIVERS[driver]
-        kinds = {
-            'markers': MarkerArray,
-            'poses': PoseArray,
-            'bodies': PoseStamped,
-            'zed': ObjectsStamped,
-            'rigid_bodies': RigidBodies,
-        }
-        kind = kinds[self._driver.input]
-        if kind is None:
-            package = 'zed_msgs' if self._driver.input == 'zed' else 'mocap4r2_msgs'
-            raise OptionsError(f'--as {driver}: expected where the package {package} is installed')
+        user, package = f'--as {driver}', PACKAGED.get(self._driver.input, '')
+        kind = require_type(package, user) if package else KINDS[self._driver.input]
         super().__init__('rrth_wearer')
         self._skeleton = load_skeleton(self._driver.skeleton)
         self._convert = stand_in(recorded, first, self._skeleton, self._driver.view)
@@ -157,20 +150,18 @@ class StandInPublisher(Node):
         }
 
     def _rigid_bodies(self, seen: Posture, stamp: Time) -> dict[str, Any]:
-        from mocap4r2_msgs.msg import RigidBody
-
+        kind = type_of_name('mocap4r2_msgs/msg/RigidBody')
         poses = poses_to_msg(seen, self._skeleton, self._driver.frame, stamp)
         bodies = [
-            RigidBody(rigid_body_name=name, pose=pose)
+            kind(rigid_body_name=name, pose=pose)
             for name, pose in zip(seen.names, poses.poses, strict=True)
         ]
         msg = self._kind(header=poses.header, frame_number=self._n_frames, rigidbodies=bodies)
         return {'': msg}
 
     def _zed(self, seen: Posture, stamp: Time) -> dict[str, Any]:
-        from zed_msgs.msg import Object
-
-        person = Object(label=f'Body_{NUMBER}', label_id=NUMBER, confidence=CONFIDENCE)
+        kind = type_of_name('zed_msgs/msg/Object')
+        person = kind(label=f'Body_{NUMBER}', label_id=NUMBER, confidence=CONFIDENCE)
         person.tracking_available = person.skeleton_available = True
         person.tracking_state = TRACKED
         person.body_format = BODY_FORMATS.index(len(seen.names))

@@ -16,7 +16,7 @@ from rclpy.node import Node
 from rrth_planner.io.extras import require
 from rrth_planner.model.errors import MessageError, ModelError, OptionsError
 from rrth_planner.ros.interface.tracker_parameters import NAME, TrackerParameters
-from rrth_planner.ros.messages.definitions import fast_decoder
+from rrth_planner.ros.messages.definitions import fast_decoder, require_type
 from rrth_planner.ros.messages.fields import NANOSECONDS, nanoseconds_of
 from rrth_planner.ros.messages.frames import FrameError, Frames
 from rrth_planner.ros.messages.posture import (
@@ -28,7 +28,6 @@ from rrth_planner.ros.messages.posture import (
     posture_of_poses,
     TrackedPosture,
 )
-from rrth_planner.ros.messages.tracker_types import ObjectsStamped, RigidBodies
 from rrth_planner.ros.messages.wearer_choice import WearerChoice
 from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscription
 from rrth_planner.wearer.jump_filter import LONGEST_GAP
@@ -124,15 +123,14 @@ class ZedInput:
 
     def __init__(self, node: Node, parameters: TrackerParameters, take: Take) -> None:
         """Subscribe."""
-        if ObjectsStamped is None:
-            raise OptionsError('input: zed, expected where the package zed_msgs is installed')
+        kind = require_type('zed_msgs/msg/ObjectsStamped', 'input zed')
         names, least = parameters.skeleton.names_by_id, parameters.min_confidence
         choice = WearerChoice(parameters.person, parameters.arm_position)
         # Who is seen next becomes the wearer.
         self.reset = choice.reset
         self._subscription = _subscribe(
             node,
-            ObjectsStamped,
+            kind,
             'skeletons',
             take,
             lambda msg: posture_from_zed(msg, names, choice, least),
@@ -144,14 +142,11 @@ class RigidBodiesInput:
 
     def __init__(self, node: Node, parameters: TrackerParameters, take: Take) -> None:
         """Subscribe."""
-        if RigidBodies is None:
-            raise OptionsError(
-                'input: rigid_bodies, expected where the package mocap4r2_msgs is installed'
-            )
+        kind = require_type('mocap4r2_msgs/msg/RigidBodies', 'input rigid_bodies')
         names, prefix = points_of(parameters.skeleton), parameters.name_prefix
         self._subscription = _subscribe(
             node,
-            RigidBodies,
+            kind,
             'rigid_bodies',
             take,
             lambda msg: posture_from_rigid_bodies(msg, names, prefix),

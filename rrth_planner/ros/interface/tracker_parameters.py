@@ -39,7 +39,7 @@ SETTINGS = (
         'arm_position',
         [0.0, 0.0, 0.0],
         'm',
-        "the arm's base in the frame of the tracker, for `person: nearest`",
+        'base of the arm in the frame of the tracker, for `person: nearest`',
     ),
     _fixed(
         'min_confidence',

@@ -88,7 +88,7 @@ def posture_from_markers(
             raise MessageError(f'id {marker.id}: given twice, expected each joint once')
         joints[joint] = marker
     points = {number: _points_of(joints, len(names), 0.0) for number, joints in people.items()}
-    chosen = _chosen(points, person, 'SPHERE markers')
+    chosen = _chosen(points, person, 'SPHERE markers of the persons')
     markers = people[chosen]
     for joint, marker in markers.items():
         if joint >= len(names):
@@ -129,7 +129,7 @@ def _chosen(people: Mapping[int, Array], person: Person, what: str) -> int:
     if number not in people:
         wanted = 'a person' if number == ONLY else f'person {number}'
         raise MessageError(
-            f'{what} of the persons {shown(sorted(people))}, expected those of {wanted}'
+            f'{what} {shown(sorted(people))}, expected those of {wanted}'
             f'{": choose one by the parameter person" if len(people) > 1 else ""}'
         )
     return number
@@ -175,7 +175,7 @@ def posture_from_zed(
             )
         found[number] = thing
         points[number] = np.array([p.kp for p in thing.skeleton_3d.keypoints[:n]], dtype=float)
-    chosen = _chosen(points, person, 'skeletons')
+    chosen = _chosen(points, person, 'skeletons of the persons')
     wearer = found[chosen]
     if wearer.tracking_available and wearer.tracking_state != TRACKED:
         is_searched = wearer.tracking_state == SEARCHED
