@@ -225,7 +225,7 @@ def towards(start, end, left):
 
 def seen_by(tracker, person):
     """Return what a tracker reports of a person."""
-    return posture_of(SEEN[tracker](person), tracker not in ('azure_kinect', 'mediapipe'))
+    return posture_of(SEEN[tracker](person), tracker not in POINTS)
 
 
 def posture_of(seen, has_rotations=True):
@@ -263,6 +263,51 @@ def mediapipe(person):
         for name, frame in joints.items():
             seen[f'{side}_{name}'] = person.at(f'{side} {frame}')
     return {name: (position, None) for name, position in seen.items()}
+
+
+def zed_body(n):
+    """Return what makes points by the names of a body format of the ZED SDK that has a spine."""
+
+    def seen_by_zed(person):
+        seen = {}
+        for name, (position, _) in azure_kinect(person).items():
+            words = name.split('_')
+            if words[-1] in ('LEFT', 'RIGHT'):
+                words = [words[-1], words[0]]
+            seen['_'.join(words)] = position, None
+        seen['CHEST_SPINE' if n == 34 else 'SPINE_3'] = seen.pop('SPINE_CHEST')
+        for side in ('LEFT', 'RIGHT') if n != 34 else ():
+            for frame in ('index', 'pinky'):
+                place = person.at(f'{side.lower()} {frame}')
+                seen[f'{side}_HAND_{frame.upper()}_1'] = place, None
+            toes = seen.pop(f'{side}_FOOT')
+            seen |= {f'{side}_BIG_TOE': toes, f'{side}_SMALL_TOE': toes}
+            del seen[f'{side}_HAND']
+        return seen
+
+    return seen_by_zed
+
+
+def coco_17(person):
+    """Return points by the names of COCO: no hands, no toes."""
+    beyond = ('index', 'pinky')
+    return {name: at for name, at in mediapipe(person).items() if not name.endswith(beyond)}
+
+
+def halpe_26(person):
+    """Return those of COCO, and toes."""
+    seen = {name: at for name, at in coco_17(person).items() if 'foot' not in name}
+    for side, _ in SIDES:
+        toes = person.at(f'{side} toes'), None
+        seen |= {f'{side}_big_toe': toes, f'{side}_small_toe': toes}
+    return seen
+
+
+def zed_body_18(person):
+    """Return those of COCO in capitals, and the middle of the shoulders."""
+    seen = {name.upper(): at for name, at in coco_17(person).items()}
+    neck = 0.5 * (seen['LEFT_SHOULDER'][0] + seen['RIGHT_SHOULDER'][0])
+    return {**seen, 'NECK': (neck, None)}
 
 
 def xsens(person):
@@ -390,4 +435,13 @@ SEEN = {
     'cmu_bvh': cmu_bvh,
     'ros4hri': ros4hri,
     'tum_bvh': tum_bvh,
+    'zed_body_18': zed_body_18,
+    'zed_body_34': zed_body(34),
+    'zed_body_38': zed_body(38),
+    'zed_body_70': zed_body(70),
+    'coco_17': coco_17,
+    'halpe_26': halpe_26,
 }
+# What reports points without rotations.
+ZED = ('zed_body_18', 'zed_body_34', 'zed_body_38', 'zed_body_70')
+POINTS = ('azure_kinect', 'mediapipe', *ZED, 'coco_17', 'halpe_26')

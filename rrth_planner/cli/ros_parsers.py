@@ -20,6 +20,12 @@ TOPICS = {
     '/diagnostics': 'diagnostic_msgs/msg/DiagnosticArray',
     'arm_playback/tool_pose': 'geometry_msgs/msg/PoseStamped',
 }
+# What a person is published as, and the drivers of trackers that he is published by.
+FORMS = ('boxes', 'markers', 'poses')
+DRIVERS = (
+    *('kinect', 'femto', 'zed', 'zed_body_18', 'zed_body_34', 'zed_body_38', 'zed_body_70'),
+    *('coco', 'halpe', 'natnet', 'vrpn', 'mocap4r2'),
+)
 POINT_AT = """\
 Request a motion that points the arm at X Y Z [m], and wait until the arm has arrived. A planner
 node and an arm (playback_node, or a controller) must run in the same ROS domain."""
@@ -61,6 +67,7 @@ examples:
   %(prog)s --rate 0.5 --latency 0.05        half as fast, every body 50 ms late
   %(prog)s walk.bvh --begin 0.1 --skeleton cmu_bvh
   %(prog)s --as markers --drop 0.1 --noise 0.01
+  %(prog)s --as zed                         as the driver of a ZED camera
 """
 SIMULATE = """\
 Run the planner with a simulated arm (masses, gravity, friction, servos), a person in the scene and
@@ -154,13 +161,14 @@ def wearer() -> argparse.ArgumentParser:
     add(
         '--as',
         dest='form',
-        choices=('boxes', 'markers', 'poses'),
+        choices=(*FORMS, *DRIVERS),
         default='boxes',
-        help='boxes on body_boxes (default), SPHERE markers on markers, or a PoseArray on poses',
+        metavar='WHAT',
+        help='boxes on body_boxes (default), markers or poses of the recorded points; or what the '
+        f'driver of a tracker publishes: {", ".join(DRIVERS)}, by its types, topics and frames',
     )
     for name, text, unit, default in (
         ('rate', 'speed of the motion; 1: as recorded, 0: standing still', '-', 1.0),
-        ('fps', 'measurements per second', '1/s', 60.0),
         ('latency', 'from a measurement until it is published, with the old stamp', 's', 0.0),
         ('drop', 'share of the measurements that are lost, 0 to below 1', '-', 0.0),
         ('noise', 'standard deviation of each coordinate of the points', 'm', 0.0),
@@ -173,6 +181,12 @@ def wearer() -> argparse.ArgumentParser:
             metavar='X',
             help=f'{text} [{unit}] (%(default)g)',
         )
+    add(
+        '--fps',
+        type=number('1/s'),
+        metavar='X',
+        help='measurements per second [1/s] (60; that of the driver with its --as)',
+    )
     add('--end', type=number('s'), metavar='X', help='end of what is played [s]')
     add('--seed', type=integer, default=0, help='random seed of noise and losses (%(default)s)')
     add(

@@ -18,12 +18,15 @@ from rrth_planner.io.motion_capture_file import load_person
 from rrth_planner.io.skeleton_file import load_skeleton
 from rrth_planner.model.errors import OptionsError, SceneError
 from rrth_planner.ros.client.person_publisher import PersonPublisher
+from rrth_planner.ros.client.stand_in_publisher import DRIVERS, StandInPublisher
 from rrth_planner.wearer.body_boxes import body_boxes
 from rrth_planner.wearer.recorded_person import excerpt, posture_at, RecordedPerson
 from rrth_planner.wearer.tracker import measurement, newest_number, publishing_time, Tracker
 
 # A signal does not end a sleep: it is seen after this long at most [s].
 LONGEST_SLEEP = 0.1
+# Measurements per second of what no driver publishes [1/s].
+FPS = 60.0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -34,8 +37,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _publish(options: argparse.Namespace, given: Sequence[str]) -> None:
+    driver = DRIVERS.get(options.form)
+    usual = driver.fps if driver else FPS
     tracker = Tracker(
-        fps=options.fps,
+        fps=usual if options.fps is None else options.fps,
         rate=options.rate,
         latency=options.latency,
         drop=options.drop,
@@ -47,7 +52,7 @@ def _publish(options: argparse.Namespace, given: Sequence[str]) -> None:
     if len(options.stature) > 2:
         raise OptionsError(f'--stature: {len(options.stature)} values, expected one or two [m]')
     skeleton = load_skeleton(options.skeleton, (options.stature[0], options.stature[-1]))
-    if options.form == 'boxes':
+    if options.form == 'boxes' or driver:
         # A skeleton of another tracker is named at once.
         try:
             _, missing = body_boxes(skeleton, posture_at(person, 0.0))
@@ -72,18 +77,25 @@ def _publish(options: argparse.Namespace, given: Sequence[str]) -> None:
     with ExitStack() as stack:
         rclpy.init(args=list(given), signal_handler_options=SignalHandlerOptions.NO)
         stack.callback(rclpy.try_shutdown)
-        node = PersonPublisher(skeleton, options.form)
+        node: PersonPublisher | StandInPublisher
+        if driver is None:
+            node = PersonPublisher(skeleton, options.form)
+        else:
+            node = StandInPublisher(skeleton, posture_at(person, 0.0), options.form)
         stack.callback(node.destroy_node)
         print(
             f'publishing {person.duration:.2f} s of a person, forwards and backwards, on '
-            f'{node.publisher.topic_name}; Ctrl-C ends it',
+            f'{node.topic_name}; Ctrl-C ends it',
             flush=True,
         )
         _publish_until(signals, node, tracker, person)
 
 
 def _publish_until(
-    signals: Sequence[int], node: PersonPublisher, tracker: Tracker, person: RecordedPerson
+    signals: Sequence[int],
+    node: PersonPublisher | StandInPublisher,
+    tracker: Tracker,
+    person: RecordedPerson,
 ) -> None:
     """Publish each measurement when it is due; a busy machine skips those that are outdated."""
     begin, number = time.monotonic(), -1

@@ -15,13 +15,15 @@ from rrth_planner.ros.interface.tracker_parameters import declare_tracker_parame
 from rrth_planner.ros.interface.tracker_reporter import because, TrackerReporter
 from rrth_planner.ros.messages.body_source import TRACKER
 from rrth_planner.ros.messages.fields import NANOSECONDS
+from rrth_planner.ros.messages.other_persons import OtherPersons
 from rrth_planner.ros.messages.part_markers import PartMarkers
 from rrth_planner.ros.messages.posture import TrackedPosture
 from rrth_planner.ros.middleware.executor import settle_interpreter, spin
 from rrth_planner.ros.middleware.node_process import run_node
-from rrth_planner.wearer.body_boxes import boxes_of_plausible
+from rrth_planner.wearer.body_boxes import base_pose, boxes_of_plausible
 from rrth_planner.wearer.jump_filter import FilteredPosture, without_jumps
 from rrth_planner.wearer.plausible_posture import plausible_posture
+from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
 NAME = TRACKER
@@ -39,10 +41,22 @@ class BodyBoxesNode(Node):
         self._before: FilteredPosture | None = None
         names = (part.name for part in self._settings.skeleton.parts)
         self._markers = PartMarkers(names, self._settings.lifetime)
+        self._others = OtherPersons(self._settings.lifetime)
         # The last body counts, and for those only who are there.
         self._publisher = self.create_publisher(MarkerArray, 'body_boxes', QoSProfile(depth=1))
         self._reporter = TrackerReporter(self, self._settings.input, self._settings.lifetime)
         self._input = create_input(self, self._settings, self._take)
+        self._reset = self.create_service(Trigger, '~/reset', self._on_reset)
+
+    def _on_reset(self, _: Any, response: Any) -> Any:
+        """Have the next person who is seen become the wearer."""
+        self._before = None
+        reset = getattr(self._input, 'reset', None)
+        if reset is not None:
+            reset()
+        response.success = True
+        response.message = 'the next person who is seen is the wearer'
+        return response
 
     def _take(self, read: Callable[[], TrackedPosture], arrived: int) -> None:
         """Publish the boxes of what `read` returns; arrived [ns]."""
@@ -86,11 +100,12 @@ class BodyBoxesNode(Node):
         own = tracked.frame if settings.skeleton.base is None else ''
         # One that is not set is handed on as such: whoever receives it adds the tracker's latency.
         stamp = Time(nanoseconds=tracked.stamp).to_msg()
-        return (
-            self._markers.message(scene, own or settings.base_frame, stamp),
-            lost,
-            plausible.doubts,
-        )
+        frame = own or settings.base_frame
+        msg = self._markers.message(scene, frame, stamp)
+        T = base_pose(settings.skeleton, self._before.posture)
+        others = {k: (points - T[:3, 3]) @ T[:3, :3] for k, points in tracked.others.items()}
+        msg.markers.extend(self._others.markers(others, frame, stamp, measured))
+        return msg, lost, plausible.doubts
 
 
 def _run(node: BodyBoxesNode) -> None:

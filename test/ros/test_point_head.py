@@ -17,9 +17,9 @@ pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 
 from action_msgs.msg import GoalStatus  # noqa: E402
-import control_messages  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
 from geometry_msgs.msg import PointStamped, Vector3  # noqa: E402
+import message_packages  # noqa: E402
 from rclpy.action import ActionClient  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
@@ -124,7 +124,7 @@ class Client(Node):
 @pytest.fixture(name='client', scope='module')
 def _client(request, ros_context):
     """Give a client of a planner and an arm, all in processes of their own."""
-    folder = control_messages.available(request.config.cache.mkdir)
+    folder = message_packages.available('control_msgs', request.config.cache.mkdir)
     from conftest import send, spinning, wait_until
     from control_msgs.action import PointHead
 

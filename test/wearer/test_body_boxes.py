@@ -34,6 +34,12 @@ LARGEST = {
     'mediapipe': 4.5,
     'ros4hri': 5.5,
     'tum_bvh': 6.5,
+    'zed_body_18': 12.0,
+    'zed_body_34': 3.7,
+    'zed_body_38': 3.7,
+    'zed_body_70': 3.7,
+    'coco_17': 12.0,
+    'halpe_26': 5.5,
 }
 # So much more than the flesh is inside where a frame of the tracker is in the chest [m].
 CLOTHES = {'xsens': 0.01, 'xsens_bvh': 0.01, 'cmu_bvh': 0.01}

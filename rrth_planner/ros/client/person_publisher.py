@@ -38,6 +38,12 @@ class PersonPublisher(Node):
         # As of trackers, the last one counts, and for those only who are there.
         self.publisher = self.create_publisher(kind, topic, QoSProfile(depth=1))
 
+    @property
+    def topic_name(self) -> str:
+        """The topic that it publishes."""
+        name: str = self.publisher.topic_name
+        return name
+
     def publish(self, posture: Posture, age: float) -> None:
         """
         Publish a posture that was measured so long ago [s].

@@ -16,16 +16,19 @@ from rclpy.node import Node
 from rrth_planner.io.extras import require
 from rrth_planner.model.errors import MessageError, ModelError, OptionsError
 from rrth_planner.ros.interface.tracker_parameters import NAME, TrackerParameters
-from rrth_planner.ros.messages.definitions import fast_decoder
+from rrth_planner.ros.messages.definitions import fast_decoder, require_type
 from rrth_planner.ros.messages.fields import NANOSECONDS, nanoseconds_of
 from rrth_planner.ros.messages.frames import FrameError, Frames
 from rrth_planner.ros.messages.posture import (
     posture_from_joint_state,
     posture_from_markers,
     posture_from_poses,
+    posture_from_rigid_bodies,
+    posture_from_zed,
     posture_of_poses,
     TrackedPosture,
 )
+from rrth_planner.ros.messages.wearer_choice import WearerChoice
 from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscription
 from rrth_planner.wearer.jump_filter import LONGEST_GAP
 from rrth_planner.wearer.link_tree import LinkTree
@@ -102,13 +105,51 @@ class MarkerInput:
 
     def __init__(self, node: Node, parameters: TrackerParameters, take: Take) -> None:
         """Subscribe."""
-        names, person = parameters.skeleton.names_by_id, parameters.person
+        names, least = parameters.skeleton.names_by_id, parameters.min_confidence
+        choice = WearerChoice(parameters.person, parameters.arm_position)
+        # Who is seen next becomes the wearer.
+        self.reset = choice.reset
         self._subscription = _subscribe(
             node,
             MarkerArray,
             'markers',
             take,
-            lambda msg: posture_from_markers(msg, names, person),
+            lambda msg: posture_from_markers(msg, names, choice, least),
+        )
+
+
+class ZedInput:
+    """`skeletons`: the persons whom a ZED camera sees."""
+
+    def __init__(self, node: Node, parameters: TrackerParameters, take: Take) -> None:
+        """Subscribe."""
+        kind = require_type('zed_msgs/msg/ObjectsStamped', 'input zed')
+        names, least = parameters.skeleton.names_by_id, parameters.min_confidence
+        choice = WearerChoice(parameters.person, parameters.arm_position)
+        # Who is seen next becomes the wearer.
+        self.reset = choice.reset
+        self._subscription = _subscribe(
+            node,
+            kind,
+            'skeletons',
+            take,
+            lambda msg: posture_from_zed(msg, names, choice, least),
+        )
+
+
+class RigidBodiesInput:
+    """`rigid_bodies`: all rigid bodies in one message, by their names."""
+
+    def __init__(self, node: Node, parameters: TrackerParameters, take: Take) -> None:
+        """Subscribe."""
+        kind = require_type('mocap4r2_msgs/msg/RigidBodies', 'input rigid_bodies')
+        names, prefix = points_of(parameters.skeleton), parameters.name_prefix
+        self._subscription = _subscribe(
+            node,
+            kind,
+            'rigid_bodies',
+            take,
+            lambda msg: posture_from_rigid_bodies(msg, names, prefix),
         )
 
 
@@ -145,7 +186,7 @@ class BodyInput:
                 OpenSubscription(
                     node,
                     PoseStamped,
-                    parameters.pose_topic.replace(NAME, name),
+                    parameters.pose_topic.replace(NAME, parameters.name_prefix + name),
                     partial(self._on_pose, name),
                     partial(_reject, take),
                     decode=fast_decoder(PoseStamped),
@@ -233,13 +274,14 @@ class TransformInput:
         """Subscribe to TF, and look it up again and again."""
         skeleton = parameters.skeleton
         self._names, self._take = points_of(skeleton), take
-        self._reference = parameters.base_frame
+        self._prefix, self._reference = parameters.name_prefix, parameters.base_frame
         if isinstance(skeleton.base, FrameBase):
             self._reference = skeleton.base.frame
         elif isinstance(skeleton.base, JointBase):
             origin = skeleton.base.origin
             self._reference = next(j.points[0] for j in skeleton.joints if j.name == origin)
-        self._frames = Frames(node, self._reference)
+        has_own = skeleton.base is not None
+        self._frames = Frames(node, (self._prefix if has_own else '') + self._reference)
         if not self._frames.is_available:
             raise OptionsError('input: tf, expected where tf2_ros is installed (a system ROS)')
         self._last = 0
@@ -254,7 +296,7 @@ class TransformInput:
         for name in self._names:
             if name != self._reference:
                 try:
-                    times[name] = self._frames.newest(name)
+                    times[name] = self._frames.newest(self._prefix + name)
                 except FrameError as error:
                     problem = problem or error
         if problem is None or times:
@@ -279,7 +321,7 @@ class TransformInput:
                 poses[k] = np.eye(4)
             elif name in seen:
                 with suppress(FrameError):
-                    poses[k] = self._frames.lookup(name, stamp)
+                    poses[k] = self._frames.lookup(self._prefix + name, stamp)
         return TrackedPosture(
             Posture(names=self._names, positions=poses[:, :3, 3], rotations=poses[:, :3, :3]),
             stamp,
@@ -293,4 +335,6 @@ _INPUTS: dict[str, Callable[[Node, TrackerParameters, Take], Any]] = {
     'bodies': BodyInput,
     'joint_states': JointInput,
     'tf': TransformInput,
+    'zed': ZedInput,
+    'rigid_bodies': RigidBodiesInput,
 }

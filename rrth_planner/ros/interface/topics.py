@@ -222,11 +222,29 @@ INTERFACES = {
             'the URDF of the person (REP 155)',
             input='joint_states',
         ),
+        _subscribed(
+            'skeletons',
+            'zed_msgs/msg/ObjectsStamped',
+            'the persons whom a ZED camera sees; where zed_msgs is installed',
+            input='zed',
+        ),
+        _subscribed(
+            'rigid_bodies',
+            'mocap4r2_msgs/msg/RigidBodies',
+            'all rigid bodies, by their names; where mocap4r2_msgs is installed',
+            input='rigid_bodies',
+        ),
+        _served(
+            '~/reset',
+            TRIGGER,
+            'the next person who is seen becomes the wearer, where `person` is -1 or `nearest`',
+        ),
         _published(
             'body_boxes',
             MARKERS,
             'a CUBE of each part; `ns` is the name of the part; a part of which a point is lost '
-            'is left out, and without the base frame all is',
+            'is left out, and without the base frame all is. Other persons are a CUBE each, '
+            '`person 3`, deleted when they have left',
         ),
         _published('/diagnostics', DIAGNOSTICS, '1 Hz'),
     ),

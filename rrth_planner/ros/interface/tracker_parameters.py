@@ -7,14 +7,19 @@ from functools import partial
 
 from rclpy.node import Node
 from rrth_planner.io.skeleton_file import load_skeleton
-from rrth_planner.model.errors import OptionsError
-from rrth_planner.ros.messages.posture import ONLY
+from rrth_planner.model.arrays import Array, frozen_array
+from rrth_planner.model.errors import OptionsError, shown
+from rrth_planner.ros.messages.wearer_choice import NEAREST, ONLY
 from rrth_planner.ros.middleware.parameter_declaration import declare, reject_unknown, Setting
 from rrth_planner.wearer.skeleton import Skeleton, STATURES
 
 # What a tracker publishes, and which of these have numbers in place of names.
-INPUTS = ('markers', 'poses', 'bodies', 'joint_states', 'tf')
-NUMBERED = ('markers', 'poses')
+INPUTS = ('markers', 'poses', 'bodies', 'joint_states', 'tf', 'zed', 'rigid_bodies')
+NUMBERED = ('markers', 'poses', 'zed')
+# Numbers of persons are at most this.
+MOST_PERSON = 10**7
+# The arm is no further from a tracker [m].
+FARTHEST_ARM = 1e3
 # What stands for the name of a rigid body in the name of its topic.
 NAME = '{name}'
 
@@ -23,7 +28,28 @@ _fixed = partial(Setting, is_read_only=True)
 SETTINGS = (
     _fixed('skeleton', 'azure_kinect', 'name or path', 'of config/skeletons, or a .yaml file'),
     _fixed('input', 'markers', ' or '.join(INPUTS), 'what the tracker publishes'),
-    _fixed('person', ONLY, '-', 'number of the wearer among markers; -1: the only one', -1, 10**7),
+    _fixed(
+        'person',
+        ONLY,
+        f'number or {NEAREST}',
+        'the wearer among several; -1: the only one; nearest: who is nearest to the arm at first',
+        is_dynamic=True,
+    ),
+    _fixed(
+        'arm_position',
+        [0.0, 0.0, 0.0],
+        'm',
+        'base of the arm in the frame of the tracker, for `person: nearest`',
+    ),
+    _fixed(
+        'min_confidence',
+        0.0,
+        '-',
+        'a point (zed: a person) with less confidence is lost',
+        0.0,
+        1.0,
+    ),
+    _fixed('name_prefix', '', 'name', 'stands before each name of the skeleton, as `Anna_`'),
     _fixed('pose_topic', f'{NAME}/pose', 'name', 'topic of each rigid body; {name} is its name'),
     _fixed('rate', 120.0, 'Hz', 'how often TF is looked up', 1.0, 1000.0),
     _fixed('base_frame', 'torso', 'frame id', 'frame of the boxes'),
@@ -39,7 +65,10 @@ class TrackerParameters:
 
     skeleton: Skeleton
     input: str
-    person: int
+    person: int | str
+    arm_position: Array
+    min_confidence: float
+    name_prefix: str
     pose_topic: str
     rate: float
     base_frame: str
@@ -70,9 +99,19 @@ def declare_tracker_parameters(node: Node) -> TrackerParameters:
     if len(stature) not in (1, 2):
         raise OptionsError(f'stature: {len(stature)} values, expected one or two [m]')
     skeleton = load_skeleton(values['skeleton'], (stature[0], stature[-1]))
+    person = values['person']
+    is_number = type(person) is int and ONLY <= person <= MOST_PERSON
+    if not is_number and person != NEAREST:
+        raise OptionsError(
+            f'person: {shown(person)}, expected a whole number from {ONLY} to {MOST_PERSON}, or '
+            f'{NEAREST}'
+        )
+    place = frozen_array(
+        list(values['arm_position'] or ()), (3,), 'arm_position', 'm', OptionsError, FARTHEST_ARM
+    )
     if values['input'] in NUMBERED and not skeleton.names_by_id:
         raise OptionsError(
             f'input: {values["input"]}, which have no names; expected a skeleton with '
             f'names_by_id, which "{values["skeleton"]}" has not'
         )
-    return TrackerParameters(**{**values, 'skeleton': skeleton})
+    return TrackerParameters(**{**values, 'skeleton': skeleton, 'arm_position': place})

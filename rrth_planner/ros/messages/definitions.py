@@ -14,7 +14,7 @@ from rosidl_parser.definition import (  # type: ignore[import-untyped]
     AbstractNestedType,
     NamespacedType,
 )
-from rrth_planner.model.errors import MessageError
+from rrth_planner.model.errors import MessageError, OptionsError
 
 # Between the text of a message and those of the messages in it, as rosbag2 and Foxglove have it.
 SEPARATOR = '=' * 80
@@ -32,6 +32,17 @@ def type_of_name(name: str) -> Any:
         return getattr(import_module(f'{package}.msg'), kind)
     except (ImportError, AttributeError, ValueError) as problem:
         raise MessageError(f'type "{name}": {problem}, expected one that is installed') from None
+
+
+def require_type(name: str, user: str) -> Any:
+    """Return the type of a name, or raise OptionsError, naming who needs its package."""
+    try:
+        return type_of_name(name)
+    except MessageError as problem:
+        package = name.partition('/')[0]
+        raise OptionsError(
+            f'{user}: expected where the package {package} is installed ({problem})'
+        ) from problem
 
 
 def definition_of(msg_type: Any) -> str:
