@@ -63,14 +63,12 @@ def test_every_motion_begins_at_the_reading_and_ends_on_the_target(
     file.write_text(arm_to_yaml(ARM, 'arm'))
     driver, said = Driver(), []
     ros = ['--ros-args', '-p', f'arm:={file}', '-p']
-    # A message that is late on a busy machine is taken, one that is of another turn is not.
-    start = [*ros, 'start_tolerance:=0.3', '-p']
 
     def playback(pan):
         driver.states.clear()
         return ChildProcess(
             'rrth_planner.ros.playback_node',
-            [*start, f'initial_positions:=[{pan}, 0.0]', '-r', 'joint_states:=true_states'],
+            [*ros, f'initial_positions:=[{pan}, 0.0]', '-r', 'joint_states:=true_states'],
             said.append,
         )
 
@@ -80,21 +78,31 @@ def test_every_motion_begins_at_the_reading_and_ends_on_the_target(
         names = [listener.node_name for listener in listeners]
         return driver.states and names.count('arm_playback') == 2
 
+    def told(words):
+        """Return how many lines of the nodes begin with some words, their level aside."""
+        return sum(line.removeprefix('WARN: ').startswith(words) for line in said)
+
     def go(way):
         """Have the arm point somewhere else, so far round [rad]."""
         begin = np.array(driver.states[-1].position)
-        n_motions, angle = len(driver.motions), begin[0] + way
+        angle = begin[0] + way
         target = np.array([2.0 * np.cos(angle), 2.0 * np.sin(angle), 0.3])
         send(driver, driver.target, samples.target(*target))
-        answer = ask(driver.plan)
-        assert answer.success, (answer.message, said)
+        # On a busy machine a message may come before the planner knows of the new playback, or too
+        # late: then the planner sees that the arm ignores it, and is asked again.
+        n_executed = told('executing')
+        while told('executing') == n_executed:
+            n_motions = len(driver.motions)
+            answer = ask(driver.plan)
+            assert answer.success, (answer.message, said)
+            given_up = f'goal of {answer.message.rpartition("; ")[2]} given up'
+            wait_until(lambda words=given_up: told('executing') > n_executed or told(words))
         wait_until(lambda: len(driver.motions) > n_motions)
         points = driver.motions[-1].points
         end = np.array(points[-1].positions)
         assert pointing_error(ARM, end, target) < 1e-6
 
         def is_there():
-            assert not [line for line in said if 'rejected' in line], said
             state = driver.states[-1]
             return np.abs(end - state.position).max() < 1e-6 and not np.any(state.velocity)
 
@@ -124,4 +132,5 @@ def test_every_motion_begins_at_the_reading_and_ends_on_the_target(
                 begin, first, end = go(way)
                 assert np.abs(first - begin).max() < 1e-9
                 assert end[0] == pytest.approx(begin[0] + way, abs=1e-6)
-    assert not [line for line in said if 'rejected' in line or 'ERROR' in line], said
+    # Of no motion was the turn another one.
+    assert not [line for line in said if 'begins at position' in line or 'ERROR' in line], said
