@@ -9,6 +9,7 @@ from typing import Any
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.time import Time
+from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import MessageError, SceneError
 from rrth_planner.ros.interface.posture_inputs import create_input
 from rrth_planner.ros.interface.tracker_parameters import declare_tracker_parameters
@@ -102,8 +103,11 @@ class BodyBoxesNode(Node):
         stamp = Time(nanoseconds=tracked.stamp).to_msg()
         frame = own or settings.base_frame
         msg = self._markers.message(scene, frame, stamp)
-        T = base_pose(settings.skeleton, self._before.posture)
-        others = {k: (points - T[:3, 3]) @ T[:3, :3] for k, points in tracked.others.items()}
+        others: dict[int, Array] = {}
+        if tracked.others:
+            T = base_pose(settings.skeleton, self._before.posture)
+            others = {k: (points - T[:3, 3]) @ T[:3, :3] for k, points in tracked.others.items()}
+        # Also where there are none any more: those who have left are deleted.
         msg.markers.extend(self._others.markers(others, frame, stamp, measured))
         return msg, lost, plausible.doubts
 

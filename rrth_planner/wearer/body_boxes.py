@@ -106,12 +106,6 @@ def boxes_of_plausible(skeleton: Skeleton, posture: Posture) -> tuple[Scene, tup
     return Scene(boxes), missing
 
 
-def joint_positions(skeleton: Skeleton, posture: Posture) -> dict[str, Array]:
-    """Return where the joints of a skeleton are in the tracker's frame, (3,), NaN: lost [m]."""
-    _, joints = _joints(skeleton, posture)
-    return {joint.name: at for joint, at in zip(skeleton.joints, joints, strict=True)}
-
-
 def base_pose(skeleton: Skeleton, posture: Posture) -> Array:
     """
     Return the pose of the base frame in the frame of a tracker, (4, 4).

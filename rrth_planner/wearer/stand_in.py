@@ -7,7 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import SceneError
-from rrth_planner.wearer.body_boxes import base_pose, joint_positions
+from rrth_planner.wearer.body_boxes import base_pose
+from rrth_planner.wearer.joint_positions import joint_positions
 from rrth_planner.wearer.posture import Posture
 from rrth_planner.wearer.skeleton import Skeleton
 
@@ -69,7 +70,7 @@ Seen = tuple[dict[str, Array], dict[str, Array]]
 
 def _points(recorded: Skeleton, posture: Posture, tracker: Skeleton) -> Seen:
     """Return the points of a tracker; those that no joint is made of are lost."""
-    joints = joint_positions(recorded, posture)
+    joints = _joints_by_name(recorded, posture)
     T = base_pose(recorded, posture)
     joints['chest'] = T[:3, :3] @ np.array(CHEST) + T[:3, 3]
     positions = {name: np.full(3, np.nan) for name in tracker.names_by_id}
@@ -80,9 +81,15 @@ def _points(recorded: Skeleton, posture: Posture, tracker: Skeleton) -> Seen:
     return positions, {}
 
 
+def _joints_by_name(skeleton: Skeleton, posture: Posture) -> dict[str, Array]:
+    """Return where each joint is in the frame of the tracker, (3,) [m], NaN: lost."""
+    places = joint_positions(skeleton, posture)
+    return {joint.name: at for joint, at in zip(skeleton.joints, places, strict=True)}
+
+
 def _plates(recorded: Skeleton, posture: Posture, _: Skeleton) -> Seen:
     """Return the rigid bodies of config/skeletons/rigid_bodies.yaml."""
-    joints = joint_positions(recorded, posture)
+    joints = _joints_by_name(recorded, posture)
     T = base_pose(recorded, posture)
     positions = {'chest': T[:3, :3] @ np.array(PLATE_ON_CHEST) + T[:3, 3]}
     rotations = {'chest': T[:3, :3]}
