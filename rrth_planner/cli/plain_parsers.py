@@ -311,7 +311,8 @@ def read_urdf() -> argparse.ArgumentParser:
     radius = 'radius of the pointing ray [m] (0; that of the links where these are bars)'
     add('--ray-radius', type=number('m'), metavar='M', help=radius)
     turns = (
-        'how often continuous joints may turn, either way from 0, for their cables (%(default)g)'
+        'how often continuous joints may turn, either way from 0, for their cables [turns] '
+        '(%(default)g)'
     )
     add('--max-turns', type=number('turns'), default=3.0, metavar='N', help=turns)
     add(
