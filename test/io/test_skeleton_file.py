@@ -28,11 +28,18 @@ def test_all_ready_made_ones_are_there():
     assert READY == [
         'azure_kinect',
         'cmu_bvh',
+        'coco_17',
+        'halpe_26',
         'mediapipe',
+        'rigid_bodies',
         'ros4hri',
         'tum_bvh',
         'xsens',
         'xsens_bvh',
+        'zed_body_18',
+        'zed_body_34',
+        'zed_body_38',
+        'zed_body_70',
     ]
 
 

@@ -144,6 +144,9 @@ def _client(request, ros_context):
         wait_until(client.heads.server_is_ready, 120.0)
         wait_until(lambda: client.states)
         send(client, client.body, samples.wearer())
+        # The planner may find the arm's joint states later than this client does.
+        n_states = len(client.states)
+        wait_until(lambda: len(client.states) > n_states + 100)
         yield client
         client.heads.destroy()
     # Its publishers would give their last body to each planner of the tests after these.
@@ -155,7 +158,7 @@ def test_a_goal_is_reached_at_its_pace_and_says_how_far_it_is(client):
     client.motions.clear()
     goal = client.goal(FRONT, pointing_frame='tool', pointing_axis=Vector3(z=2.0))
     goal.max_velocity, goal.min_duration.sec = 0.9, 3
-    assert client.status(client.start(goal)[1]) == SUCCEEDED
+    assert client.status(client.start(goal)[1]) == SUCCEEDED, client.said
     assert client.angle(FRONT) < POINTING
     client.wait_until(lambda: client.speed() == 0.0)
     client.wait_for_report('last sentence', 'the arm has arrived, pointing error 0.00')
