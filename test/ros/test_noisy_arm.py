@@ -5,6 +5,7 @@
 from collections import deque
 from contextlib import ExitStack
 from itertools import cycle
+import time
 
 import numpy as np
 import pytest
@@ -88,6 +89,9 @@ def test_all_requests_begin_and_where_the_arm_is(separation, wait_until, send, s
         stack.enter_context(ChildProcess(node('planner'), given, lambda _: None))
         stack.enter_context(spinning(client))
         wait_until(client.plan.service_is_ready, 120.0)
+        # Bodies come every 20 ms; the planner may find them later than its service is found.
+        wait_until(client.body.get_subscription_count)
+        time.sleep(0.5)
         targets, is_first = cycle(TARGETS), True
         for kind, n_requests in N_REQUESTS.items():
             client.encode = ENCODERS[kind]
