@@ -204,9 +204,8 @@ def _measures(rest: Array, scale: float, size: float) -> str:
     skew = [np.abs(np.sort(rest[:, k]) + np.sort(rest[:, k])[::-1]).max() for k in range(3)]
     lateral = int(np.argmin(np.where(extents > 0.0, skew, np.inf)))
     height = scale * float(max(extents[k] for k in range(3) if k != lateral))
-    if height >= TALL or height <= 0.0:
-        return f'the skeleton is {max(height, 0.0) or size:.2f} m tall'
-    return f'the skeleton is {height:.2f} m tall, and {size:.2f} m from end to end'
+    tall = f'the skeleton is {height:.2f} m tall'
+    return tall if height >= TALL else f'{tall}, and {size:.2f} m from end to end'
 
 
 def _guessed_unit(size: float) -> str:
@@ -226,9 +225,11 @@ def _from_c3d(file: Path, n_bytes: int, unit: str | None) -> RecordedPerson:
     import c3d
 
     class Frames(c3d.Reader):  # type: ignore[misc]
-        """Counts frames from 0, by the data."""
+        """Reads so many frames from the first one on, whatever their numbers are."""
 
-        n_frames = 0
+        def __init__(self, handle: Any, n_frames: int) -> None:
+            self._n_frames = n_frames
+            super().__init__(handle)
 
         @property
         def first_frame(self) -> int:
@@ -236,20 +237,19 @@ def _from_c3d(file: Path, n_bytes: int, unit: str | None) -> RecordedPerson:
 
         @property
         def last_frame(self) -> int:
-            return self.n_frames - 1
+            return self._n_frames - 1
 
     with file.open('rb') as handle:
-        reader = Frames(handle)
-        labels = _labels(reader)
-        reader.n_frames = _count_frames(reader, n_bytes)
-        _check_size(reader.n_frames, int(reader.point_used))
+        reader = c3d.Reader(handle)
+        labels, n_frames = _labels(reader), _count_frames(reader, n_bytes)
+        _check_size(n_frames, int(reader.point_used))
         if len(labels) > reader.point_used:
             raise RecordError(f'{len(labels)} names of {reader.point_used} points')
-        frames = [points for _, points, _ in reader.read_frames()]
+        frames = [points for _, points, _ in Frames(handle, n_frames).read_frames()]
         given = unit or _text(reader.get('POINT:UNITS')).lower()
         rate = float(reader.point_rate)
-    if len(frames) != reader.n_frames:
-        raise RecordError(f'{len(frames)} frames, expected {reader.n_frames}: the file is cut off')
+    if len(frames) != n_frames:
+        raise RecordError(f'{len(frames)} frames, expected {n_frames}: the file is cut off')
     if unit is None and given not in UNITS:
         raise RecordError(f'lengths in "{given}", expected {", ".join(UNITS)}')
     # Columns of a point: its position, the residual, and the cameras; without a name it is noise.
@@ -289,17 +289,18 @@ def _count_frames(reader: Any, n_bytes: int) -> int:
     c3d 0.6.0 counts the second word of a start field by 65535, and the header ends at 65535.
     """
     header = reader.header
-    first, last = _field(reader, 'START', header.first_frame), None
-    if reader.get('TRIAL:ACTUAL_END_FIELD') is not None:
-        last = _field(reader, 'END', header.last_frame)
-    stated = (super(type(reader), reader).last_frame if last is None else last) - first + 1
+    first = _field(reader, 'START', header.first_frame)
+    # As the library: what ends before the header says so is not believed.
+    last = max(_field(reader, 'END', 0), int(reader.last_frame))
+    stated = last - first + 1
     # Data are in blocks of 512 bytes; a number is a float where the scale is negative.
     size = 4 if reader.point_scale < 0.0 else 2
     n_analog = int(reader.analog_used) * int(reader.analog_per_frame)
     one = size * (4 * int(reader.point_used) + n_analog)
     data = n_bytes - 512 * (int(header.data_block) - 1)
     there = data // one if one else 0
-    is_full = header.last_frame >= FULL and last is None
+    # Without the field of two words nothing says of more frames than the header can.
+    is_full = last == FULL and reader.get('TRIAL:ACTUAL_END_FIELD') is None
     if stated < 1 or (is_full and there > stated):
         return int(there)
     return int(stated)

@@ -6,12 +6,12 @@ from collections.abc import Callable
 import sys
 from typing import Any
 
+import numpy as np
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.time import Time
-from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import MessageError, SceneError
-from rrth_planner.ros.interface.posture_inputs import create_input
+from rrth_planner.ros.interface.posture_inputs import create_input, PersonInput
 from rrth_planner.ros.interface.tracker_parameters import declare_tracker_parameters
 from rrth_planner.ros.interface.tracker_reporter import because, TrackerReporter
 from rrth_planner.ros.messages.body_source import TRACKER
@@ -52,9 +52,8 @@ class BodyBoxesNode(Node):
     def _on_reset(self, _: Any, response: Any) -> Any:
         """Have the next person who is seen become the wearer."""
         self._before = None
-        reset = getattr(self._input, 'reset', None)
-        if reset is not None:
-            reset()
+        if isinstance(self._input, PersonInput):
+            self._input.reset()
         response.success = True
         response.message = 'the next person who is seen is the wearer'
         return response
@@ -103,12 +102,9 @@ class BodyBoxesNode(Node):
         stamp = Time(nanoseconds=tracked.stamp).to_msg()
         frame = own or settings.base_frame
         msg = self._markers.message(scene, frame, stamp)
-        others: dict[int, Array] = {}
-        if tracked.others:
-            T = base_pose(settings.skeleton, self._before.posture)
-            others = {k: (points - T[:3, 3]) @ T[:3, :3] for k, points in tracked.others.items()}
         # Also where there are none any more: those who have left are deleted.
-        msg.markers.extend(self._others.markers(others, frame, stamp, measured))
+        T = base_pose(settings.skeleton, self._before.posture) if tracked.others else np.eye(4)
+        msg.markers.extend(self._others.markers(tracked.others, T, frame, stamp, measured))
         return msg, lost, plausible.doubts
 
 

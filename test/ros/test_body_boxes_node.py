@@ -488,6 +488,30 @@ def test_a_person_among_others_is_chosen_by_his_number(start):
     expect(msg, tracker.skeleton, posture)
 
 
+@pytest.mark.parametrize('place', [np.inf, np.nan, 0.0, 1e7])
+def test_a_point_of_another_person_that_is_none_changes_no_box(start, place):
+    tracker = start('azure_kinect', 'markers', person=3)
+    posture, other = person_of('azure_kinect'), person_of('azure_kinect', seed=8)
+    sizes = []
+    for k, lost in enumerate((np.nan, place)):
+        positions = other.positions.copy()
+        positions[5] = lost
+        theirs = replace(other, positions=positions)
+        msg = points_to_msg(posture, tracker.skeleton, 'camera', stamp_of(NOW + k * STEP))
+        for marker in msg.markers:
+            marker.id += 300
+        msg.markers += points_to_msg(theirs, tracker.skeleton, 'camera', Time()).markers
+        if k == 1 and np.isfinite(place):
+            assert any(marker.pose.position.x == place for marker in msg.markers)
+        tracker.publishers_of['markers'].publish(msg)
+        boxes = tracker.wait_for(NOW + k * STEP)
+        assert boxes.markers[-1].text == 'person 0'
+        sizes.append(boxes.markers[-1].scale)
+        del boxes.markers[-1]
+        expect(boxes, tracker.skeleton, posture)
+    assert sizes[0] == sizes[1]
+
+
 def test_a_rigid_body_that_is_lost_delays_no_other(start):
     tracker = start('xsens', 'bodies')
     posture = person_of('xsens')

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Subscriptions to what trackers publish of a person, each kind of which becomes postures."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 import time
@@ -100,41 +100,39 @@ def _reject(take: Take, problem: MessageError) -> None:
     take(read, time.time_ns())
 
 
-class MarkerInput:
+class PersonInput:
+    """Persons by their numbers; the one who is the wearer stays that until `reset`."""
+
+    def __init__(
+        self,
+        node: Node,
+        parameters: TrackerParameters,
+        take: Take,
+        kind: type,
+        topic: str,
+        read: Callable[[Any, Sequence[str], WearerChoice, float], TrackedPosture],
+    ) -> None:
+        """Subscribe to a kind of messages, which `read` reads."""
+        names, least = parameters.skeleton.names_by_id, parameters.min_confidence
+        self._choice = WearerChoice(parameters.person, parameters.arm_position)
+        self._subscription = _subscribe(
+            node, kind, topic, take, lambda msg: read(msg, names, self._choice, least)
+        )
+
+    def reset(self) -> None:
+        """Have who is seen next become the wearer."""
+        self._choice.reset()
+
+
+def _marker_input(node: Node, parameters: TrackerParameters, take: Take) -> PersonInput:
     """`markers`: a SPHERE a joint, by numbers."""
-
-    def __init__(self, node: Node, parameters: TrackerParameters, take: Take) -> None:
-        """Subscribe."""
-        names, least = parameters.skeleton.names_by_id, parameters.min_confidence
-        choice = WearerChoice(parameters.person, parameters.arm_position)
-        # Who is seen next becomes the wearer.
-        self.reset = choice.reset
-        self._subscription = _subscribe(
-            node,
-            MarkerArray,
-            'markers',
-            take,
-            lambda msg: posture_from_markers(msg, names, choice, least),
-        )
+    return PersonInput(node, parameters, take, MarkerArray, 'markers', posture_from_markers)
 
 
-class ZedInput:
+def _zed_input(node: Node, parameters: TrackerParameters, take: Take) -> PersonInput:
     """`skeletons`: the persons whom a ZED camera sees."""
-
-    def __init__(self, node: Node, parameters: TrackerParameters, take: Take) -> None:
-        """Subscribe."""
-        kind = require_type('zed_msgs/msg/ObjectsStamped', 'input zed')
-        names, least = parameters.skeleton.names_by_id, parameters.min_confidence
-        choice = WearerChoice(parameters.person, parameters.arm_position)
-        # Who is seen next becomes the wearer.
-        self.reset = choice.reset
-        self._subscription = _subscribe(
-            node,
-            kind,
-            'skeletons',
-            take,
-            lambda msg: posture_from_zed(msg, names, choice, least),
-        )
+    kind = require_type('zed_msgs/msg/ObjectsStamped', 'input zed')
+    return PersonInput(node, parameters, take, kind, 'skeletons', posture_from_zed)
 
 
 class RigidBodiesInput:
@@ -330,11 +328,11 @@ class TransformInput:
 
 
 _INPUTS: dict[str, Callable[[Node, TrackerParameters, Take], Any]] = {
-    'markers': MarkerInput,
+    'markers': _marker_input,
     'poses': PoseInput,
     'bodies': BodyInput,
     'joint_states': JointInput,
     'tf': TransformInput,
-    'zed': ZedInput,
+    'zed': _zed_input,
     'rigid_bodies': RigidBodiesInput,
 }

@@ -9,6 +9,7 @@ import numpy as np
 from rrth_planner.model.arrays import Array
 from rrth_planner.ros.messages.body_writer import COLOR
 from rrth_planner.ros.messages.fields import NANOSECONDS
+from rrth_planner.wearer.joint_positions import FARTHEST_POINT
 from visualization_msgs.msg import Marker
 
 # A box reaches so far beyond the points of a person: a hand beyond the wrist, or half a trunk [m].
@@ -32,12 +33,31 @@ class OtherPersons:
         self._seen: dict[int, int] = {}
 
     def markers(
-        self, others: Mapping[int, Array], frame: str, stamp: Time, measured: int
+        self,
+        others: Mapping[int, Array],
+        T_tracker_frame: Array,
+        frame: str,
+        stamp: Time,
+        measured: int,
     ) -> list[Marker]:
-        """Return the markers of persons whose points are (n, 3) in a frame [m]; measured [ns]."""
+        """
+        Return the markers of persons in a frame.
+
+        Parameters
+        ----------
+        others : mapping of int to ndarray, shape (n, 3)
+            Their points, as the tracker has them [m].
+        T_tracker_frame : ndarray, shape (4, 4)
+            The pose of the frame in that of the tracker [m].
+        measured : int
+            When the tracker saw them [ns].
+
+        """
         markers = []
         for number, points in others.items():
-            seen = points[~np.isnan(points).any(axis=1)]
+            # As of the wearer: what is not finite, absurdly far, or at exactly 0 0 0 is lost.
+            is_seen = (np.abs(points) <= FARTHEST_POINT).all(axis=1) & points.any(axis=1)
+            seen = (points[is_seen] - T_tracker_frame[:3, 3]) @ T_tracker_frame[:3, :3]
             if not len(seen):
                 continue
             self._seen[number] = measured
