@@ -229,7 +229,7 @@ def _canonical(joint: _Node, values: Array) -> Array:
 
 def _write(node: _Node, written: list[str], numbers: dict[int, int]) -> None:
     """Append the lines of a node and of those in it."""
-    # A chain of people has tens of joints; of a file with more, nothing may run out.
+    # Not by recursion: a file may nest more joints than the interpreter does calls.
     left: list[_Node | None] = [node]
     while left:
         item = left.pop()

@@ -114,7 +114,7 @@ def _from_bvh(
     # Imported here: `require` has checked that it is installed.
     import pybvh
 
-    n_nodes = data.count(b'JOINT') + data.lower().count(b'end')
+    n_nodes = sum(data.lower().count(word) for word in (b'joint', b'end'))
     if n_nodes > 2 * MOST_JOINTS:
         raise RecordError(f'{n_nodes} joints and ends, expected at most {MOST_JOINTS} joints')
     found = read_bvh_text(data)
