@@ -4,7 +4,8 @@
 Plan from starts that meet, near or cross boxes of 0.1 um to 5 mm, and compare the checkers.
 
 It prints what became of the plans: both checks of a motion have to agree, and the reference
-checker looks at every motion densely. It ends with 1 where one does not.
+checker looks at every motion densely. It ends with 1 where one does not, and with 2 where a
+library of the second checker is not installed.
 """
 
 import argparse
@@ -12,6 +13,9 @@ from collections import Counter
 from collections.abc import Sequence
 import sys
 import time
+
+from rrth_planner.collision.distance_library import LIBRARIES, require_library
+from rrth_planner.model.errors import ModelError
 
 from benchmarks.separation.runs import each
 from benchmarks.thin_boxes.verdict import Verdict, verdict_of
@@ -40,6 +44,12 @@ def lines_of(verdicts: Sequence[Verdict]) -> list[str]:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Plan, print the table, and every plan that is wrong with its seed."""
     options = _parser().parse_args(arguments)
+    for library in LIBRARIES:
+        try:
+            require_library(library)
+        except ModelError as problem:
+            print(f'thin_boxes: {problem}', file=sys.stderr)
+            return 2
     n = QUICK if options.quick else options.plans
     begin = time.perf_counter()
     seeds = range(options.seed, options.seed + n)
