@@ -350,7 +350,7 @@ def note_rest(
     if reading is None:
         return known, False
     if reading.is_moving(reading.taken, rules.rest_speed):
-        return replace(known, rest=None), False
+        return known if known.rest is None else replace(known, rest=None), False
     if known.is_active:
         place, after = _commanded(known, reading.taken), IGNORED_AFTER
     else:
@@ -362,7 +362,7 @@ def note_rest(
         and float(np.abs(place - then).max()) > IGNORED_WAY
         and float(np.abs(place - reading.positions).max()) > ASIDE
     )
-    return replace(known, rest=(since, then)), is_ignored
+    return known if known.rest else replace(known, rest=(since, then)), is_ignored
 
 
 def has_moved(

@@ -153,7 +153,7 @@ def check_command(
     taken = max(reading.taken, now - lag)
     is_off = tracked.command.deviation(reading.positions, taken, lag) > OFF_COMMAND
     if not is_off or reading.is_moving(now, tracked.rest_speed):
-        return replace(tracked, off_since=None)
+        return tracked if tracked.off_since is None else replace(tracked, off_since=None)
     if tracked.off_since is None:
         return replace(tracked, off_since=steady)
     return forget_command(tracked) if steady - tracked.off_since > OFF_AFTER else tracked

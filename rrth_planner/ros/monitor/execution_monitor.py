@@ -694,9 +694,9 @@ class ExecutionMonitor:
                 self._reporter.separation_status(found.status)
             return unchanged
         took = time.perf_counter() - begin
-        self._commitments = given.note_took(before, took)
         if took > before.within:
             # The arm is on its way to rest by then: from there the next one goes on.
+            self._commitments = given.note_took(before, took)
             return unchanged
         assert found.next.sent is not None
         message = found.next.sent.motion
