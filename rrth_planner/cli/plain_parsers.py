@@ -202,7 +202,7 @@ def plot() -> argparse.ArgumentParser:
     )
     recording = commands.add_parser('recording', help='draw a run recorded by `record`')
     add = recording.add_argument
-    add('file', type=Path, metavar='FILE', help='MCAP')
+    add('file', type=Path, metavar='FILE', help='MCAP file, or the folder of a `ros2 bag`')
     for name in ('begin', 'end'):
         what = f'{name} of the drawn interval [s]; < 0: relative to the end of the run'
         add(f'--{name}', type=number('s'), metavar='S', help=what)

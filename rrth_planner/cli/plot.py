@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 DOTS_PER_INCH = 110
 KINDS = ('.png', '.svg', '.pdf')
-TOOLS = (ROS, 'mcap', 'mcap_ros2')
+TOOLS = (ROS, 'mcap', 'mcap_ros2', 'rosbags', 'zstandard')
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -91,7 +91,7 @@ def _draw_recording(options: argparse.Namespace) -> 'Figure':
         last = float(recording.times[-1])
         begin, end = _time(options.begin, -np.inf, last), _time(options.end, np.inf, last)
         recording = section(recording, begin, end)
-    return recording_figure(recording, arm, settings, options.file.name)
+    return recording_figure(recording, arm, settings, options.file.absolute().name)
 
 
 def _time(given: float | None, default: float, last: float) -> float:

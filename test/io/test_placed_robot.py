@@ -88,3 +88,66 @@ def test_a_mesh_that_is_missing_is_one_sentence(tmp_path):
     file = urdf(tmp_path, shape='<mesh filename="package://none/part.stl"/>')
     with pytest.raises(ModelError, match='no mesh .package://none/part.stl'):
         place_robot(file, arm_of(file)[0].arm)
+
+
+def test_a_joint_moves_as_in_the_arm_however_long_its_axis_is(tmp_path):
+    joints = [
+        ('a', 'revolute', 'root', 'upper', 'xyz="0.1 0.2 0" rpy="0.3 0 0.2"', '0 0 5', '-1'),
+        ('b', 'revolute', 'upper', 'lower', 'xyz="0 0.05 0.3" rpy="0 0.4 0"', '0 -0.1 0', '-1'),
+        ('c', 'prismatic', 'lower', 'hand', 'xyz="0.2 0 0.1"', '0 2 2', '-1'),
+    ]
+    file = urdf(tmp_path, joints)
+    chain = read_chain(file, 'root', 'hand', '+x')
+    arm = import_chain(chain, pose_matrix([0.0, 0.0, 0.2], [0.0, 0.0, 0.0, 1.0]), 0.02).arm
+    robot, q = place_robot(file, arm), np.array([0.3, -0.4, 0.5])
+    robot.model.update_cfg(robot.values(q))
+    hand = robot.model.get_transform('hand', 'root')
+    np.testing.assert_allclose(hand, chain.tool_pose(q), atol=1e-9)
+
+
+# A tetrahedron of 3 x 4 x 5 of the file's units, which its scene moves.
+DAE = (
+    '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset>'
+    '<created>2026-01-01T00:00:00</created><modified>2026-01-01T00:00:00</modified>{unit}'
+    '<up_axis>Z_UP</up_axis></asset><library_geometries><geometry id="g" name="g"><mesh>'
+    '<source id="p"><float_array id="pa" count="12">0 0 0 3 0 0 0 4 0 0 0 5</float_array>'
+    '<technique_common><accessor source="#pa" count="4" stride="3"><param name="X" type="float"/>'
+    '<param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common>'
+    '</source><vertices id="v"><input semantic="POSITION" source="#p"/></vertices>'
+    '<triangles count="4"><input semantic="VERTEX" source="#v" offset="0"/>'
+    '<p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles></mesh></geometry></library_geometries>'
+    '<library_visual_scenes><visual_scene id="s" name="s"><node id="n" name="n">'
+    '<translate>1 2 0</translate><instance_geometry url="#g"/></node></visual_scene>'
+    '</library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>'
+)
+
+
+@pytest.mark.parametrize(
+    ('unit', 'metres'),
+    [
+        ('<unit name="centimeter" meter="0.01"/>', 0.01),
+        ('<unit meter="0.0254"/>', 0.0254),
+        ('', 1),
+    ],
+)
+@pytest.mark.parametrize(
+    ('scale', 'factor'), [('', 1.0), ('scale="2"', 2.0), ('scale="0.1 0.2 0.3"', [0.1, 0.2, 0.3])]
+)
+def test_a_mesh_is_seen_as_large_as_the_capsules_enclose_it(tmp_path, unit, metres, scale, factor):
+    pytest.importorskip('collada')
+    (tmp_path / 'part.dae').write_text(DAE.format(unit=unit))
+    file = urdf(tmp_path)
+    found, _ = arm_of(file)
+    mesh = f'<mesh filename="part.dae" {scale}/>'
+    text = file.read_text().replace(LINK.format('hand', BOX), LINK.format('hand', mesh))
+    file.write_text(text)
+    robot = place_robot(file, found.arm)
+    low, high = np.array([[1.0, 2.0, 0.0], [4.0, 6.0, 5.0]]) * metres * factor
+    scene, corners = robot.model.scene, []
+    for node in scene.graph.nodes_geometry:
+        T, name = scene.graph.get(node, 'hand')
+        # The other links are boxes.
+        if len(scene.geometry[name].faces) == 4:
+            corners.append(scene.geometry[name].vertices @ T[:3, :3].T + T[:3, 3])
+    np.testing.assert_allclose(np.concatenate(corners).min(axis=0), low, atol=1e-9)
+    np.testing.assert_allclose(np.concatenate(corners).max(axis=0), high, atol=1e-9)

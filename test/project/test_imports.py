@@ -61,7 +61,7 @@ OWN = {
     'rrth_planner.io.urdf.placed_robot': {'yourdfpy'},
     'rrth_planner.reproduction.row_store': {'pyarrow'},
     'rrth_planner.ros.client.recorder': {'mcap'},
-    'rrth_planner.ros.client.recording_reader': {'mcap', 'mcap_ros2'},
+    'rrth_planner.ros.client.recording_files': {'mcap', 'mcap_ros2', 'rosbags', 'zstandard'},
     'rrth_planner.ros.messages.definitions': {'rosbags'},
     'rrth_planner.simulation.film': {'imageio'},
     'rrth_planner.visualization.viewer.screenshot': {'playwright'},

@@ -25,7 +25,7 @@ KEYS = {
 # rosdep has no key for these, or only one that pip serves; requirements/ lists them.
 BY_PIP = {
     *('c3d', 'distributed', 'imageio', 'mcap', 'mcap_ros2', 'mujoco', 'playwright', 'pyarrow'),
-    *('pybvh', 'rosbags', 'trimesh', 'viser', 'yourdfpy'),
+    *('pybvh', 'rosbags', 'trimesh', 'viser', 'yourdfpy', 'zstandard'),
 }
 
 

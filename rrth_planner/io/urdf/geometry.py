@@ -171,7 +171,7 @@ def mesh_triangles(path: Path, label: str) -> Array:
         require('tools', *TOOLS, 'collada')
     try:
         mesh: Any = trimesh.load(path, force='mesh', process=False, skip_materials=True)
-        unit = _unit(path) if kind == '.dae' else 1.0
+        unit = collada_unit(path) if kind == '.dae' else 1.0
         triangles = unit * np.asarray(mesh.triangles, dtype=np.float64)
     # Each format has a reader of its own, and each reader errors of its own.
     except Exception as problem:
@@ -186,7 +186,7 @@ def mesh_triangles(path: Path, label: str) -> Array:
     return triangles
 
 
-def _unit(path: Path) -> float:
+def collada_unit(path: Path) -> float:
     """Return how long the units of a COLLADA file are [m]; up_axis is ignored, as ROS does."""
     for _, element in ElementTree.iterparse(path, events=('start',)):
         if element.tag.rpartition('}')[2] == 'unit':

@@ -4,15 +4,22 @@
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
-import logging
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 from rrth_planner.io.extras import require
 from rrth_planner.io.text_file import load_xml
-from rrth_planner.io.urdf.chain import NO_URDF, read_chain, TOOLS, urdf_model, urdf_text, UrdfChain
-from rrth_planner.io.urdf.geometry import mesh_file
+from rrth_planner.io.urdf.chain import (
+    joint_axis,
+    NO_URDF,
+    read_chain,
+    TOOLS,
+    urdf_model,
+    UrdfChain,
+)
+from rrth_planner.io.urdf.geometry import collada_unit, mesh_file
 from rrth_planner.model.arm import ArmModel, forward_kinematics
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import ModelError
@@ -23,6 +30,8 @@ with suppress(ImportError):
 
 # A joint of the URDF this near to that of the arm is the same one [m, rad].
 SAME = 2e-3
+# The types of joints that have an axis.
+MOVING = ('revolute', 'continuous', 'prismatic')
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,18 +129,39 @@ def place_chain(file: Path, arm: ArmModel) -> tuple[UrdfChain, Array]:
 
 def _with_meshes(file: Path) -> Any:
     """Return the robot of a file with the meshes of its links, or raise ModelError."""
-    logging.getLogger('yourdfpy').setLevel(logging.CRITICAL)
-    text = urdf_text(load_xml(file), f'file {file}')
+    label = f'file {file}'
+    robot = urdf_model(load_xml(file), label).robot
+    for joint in robot.joints:
+        # yourdfpy moves what slides by the length of its axis.
+        if joint.type in MOVING:
+            joint.axis = joint_axis(joint)
+    for link in robot.links:
+        for part in link.visuals:
+            mesh = None if part.geometry is None else part.geometry.mesh
+            if mesh is not None and mesh.filename:
+                mesh.scale = _in_metres(mesh, file, f'link "{link.name}"')
     try:
-        return yourdfpy.URDF.load(
-            text,
+        return yourdfpy.URDF(
+            robot=robot,
             build_scene_graph=True,
             load_meshes=True,
             filename_handler=lambda fname: str(mesh_file(fname, file, 'mesh')),
         )
     except NO_URDF as problem:
         said = ' '.join(f'{type(problem).__name__}: {problem}'.split())
-        raise ModelError(f'file {file}: {said}; expected meshes that can be read') from problem
+        raise ModelError(f'{label}: {said}; expected meshes that can be read') from problem
+
+
+def _in_metres(mesh: Any, file: Path, label: str) -> Any:
+    """Return the scale of a mesh, with the unit of its file: a number, (3,), or None for 1."""
+    path = mesh_file(mesh.filename, file, label)
+    if path.suffix.lower() != '.dae':
+        return mesh.scale
+    try:
+        unit = collada_unit(path)
+    except (OSError, ValueError, ElementTree.ParseError) as problem:
+        raise ModelError(f'{label}: file {path}: {problem}; expected a readable mesh') from problem
+    return unit if mesh.scale is None else unit * mesh.scale
 
 
 def _fitted(lines: tuple[Array, Array], places: tuple[Array, Array]) -> Array | None:

@@ -1,15 +1,11 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Read a recorded run from an MCAP file of any recorder."""
+"""Read a recorded run from an MCAP file of any recorder, or from the folder of a ros2 bag."""
 
 from collections.abc import Callable
 from pathlib import Path
-import struct
 from typing import Any, NamedTuple
 
-from mcap.exceptions import EndOfFile
-from mcap.reader import NonSeekingReader
-from mcap_ros2.decoder import DecoderFactory
 import numpy as np
 from rrth_planner.execution.joint_reading import JointReading
 from rrth_planner.execution.recording import CommandedMotion, Recording
@@ -17,6 +13,7 @@ from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import MessageError, RecordError
 from rrth_planner.model.scene import Scene
+from rrth_planner.ros.client.recording_files import decoder_of, stored_messages
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.body_publishers import BodyPublishers, UNNUMBERED
 from rrth_planner.ros.messages.fields import NANOSECONDS, seconds_of
@@ -48,10 +45,10 @@ class RecordedMessage(NamedTuple):
 
 class RecordingReader:
     """
-    The messages of a file, checked as by the nodes; bad ones are left out.
+    The messages of a recording, checked as by the nodes; bad ones are left out.
 
     `rejected` says, by topic, why the last bad one was. Messages in other frames than the
-    planner's `base_frame` are. Raises RecordError where the file cannot be read, or holds no run,
+    planner's `base_frame` are. Raises RecordError where a file cannot be read, or holds no run,
     or several and no namespace chooses one.
     """
 
@@ -193,41 +190,43 @@ def _read(path: Path) -> tuple[dict[str, list[RecordedMessage]], int, dict[str, 
     """Return a run by topic, when its first message came [ns], and why messages are left out."""
     topics: dict[str, list[RecordedMessage]] = {}
     rejected: dict[str, str] = {}
-    factory, begin = DecoderFactory(), 0
-    try:
-        with path.open('rb') as file:
-            # From front to back, since a recorder that was killed has written no index.
-            for schema, channel, message in NonSeekingReader(file).iter_messages(
-                log_time_order=False
-            ):
-                begin = min(begin or message.log_time, message.log_time)
-                role = channel.topic.rsplit('/', 1)[-1]
-                decode = factory.decoder_for(channel.message_encoding, schema)
-                if schema is None or decode is None or TYPES.get(role) != schema.name:
-                    continue
-                recorded = topics.setdefault(channel.topic, [])
-                try:
-                    msg = decode(message.data)
-                except Exception as problem:
-                    # A publisher may have sent anything: the next messages count.
-                    rejected[channel.topic] = (
-                        f'{len(message.data)} bytes ({problem or type(problem).__name__}), '
-                        f'expected a {schema.name}'
-                    )
-                    continue
-                recorded.append(RecordedMessage(msg, message.publish_time, message.log_time))
-    except OSError as problem:
-        raise RecordError(f'{path}: {problem.strerror}, expected a recording') from problem
-    except (EndOfFile, struct.error):
-        # The file is cut off: what is there counts.
-        pass
-    except Exception as problem:
-        # The file may hold anything.
-        raise RecordError(
-            f'{path}: {problem or type(problem).__name__}, expected an MCAP file of ROS 2 messages'
-        ) from problem
+    decoders: dict[tuple[str, str, bytes], Callable[[bytes], Any]] = {}
+    begin = 0
+    for topic, schema, data, sent, received in stored_messages(path):
+        begin = min(begin or received, received)
+        if TYPES.get(topic.rsplit('/', 1)[-1]) != schema.name:
+            continue
+        recorded = topics.setdefault(topic, [])
+        kind = schema.name, schema.encoding, schema.data
+        try:
+            if kind not in decoders:
+                decoders[kind] = _decoder_of(schema)
+            msg = decoders[kind](data)
+        except Exception as problem:
+            # A publisher may have sent anything: the next messages count.
+            rejected[topic] = (
+                f'{len(data)} bytes ({problem or type(problem).__name__}), '
+                f'expected a {schema.name}'
+            )
+            continue
+        recorded.append(RecordedMessage(msg, sent, received))
     if not topics:
         raise RecordError(
-            f'{path}: none of {", ".join(TYPES)} in it, expected an MCAP file of a run'
+            f'{path}: none of {", ".join(TYPES)} in it, expected an MCAP file of a run, or the '
+            'folder of a ros2 bag'
         )
     return topics, begin, rejected
+
+
+def _decoder_of(schema: Any) -> Callable[[bytes], Any]:
+    """Return what decodes messages of a type, or rejects each if its definition is none."""
+    try:
+        return decoder_of(schema)
+    # A file may have anything as definition.
+    except Exception as problem:
+        sentence = f'unreadable definition: {problem or type(problem).__name__}'
+
+        def reject(data: bytes) -> None:
+            raise MessageError(sentence)
+
+        return reject
