@@ -12,7 +12,7 @@ from rrth_planner.collision.world import World
 from rrth_planner.kernels.collision.arm_clearance import least_along
 from rrth_planner.kernels.collision.trajectory_check import prove_pieces
 from rrth_planner.kernels.trajectory.quintics import bound
-from rrth_planner.model.arrays import Array, check_dof
+from rrth_planner.model.arrays import Array, check_dof, float_number
 from rrth_planner.model.bernstein import to_bernstein
 from rrth_planner.model.trajectory import piece_coefficients, Trajectory
 
@@ -59,6 +59,7 @@ def certify(trajectory: Trajectory, world: World, begin: float = 0.0) -> Certifi
     second-order bounds and the numbers that the trajectory holds, from the time `begin` on [s].
     """
     check_dof(trajectory.positions, world.bounds.shape[1], 'trajectory')
+    begin = float_number(begin, 'begin', 's')
     if len(trajectory.times) == 1 or begin >= trajectory.duration:
         is_free = world.is_free(trajectory.positions[-1])
         return Certificate(is_proven=is_free, piece=-1 if is_free else 0, is_violated=not is_free)

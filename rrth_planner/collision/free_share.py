@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from rrth_planner.collision.world import World
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.frozen import Frozen
 
 # Random configurations, always the same.
 N_SAMPLES, SEED = 1000, 0
@@ -18,7 +19,7 @@ SIGHT = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class FreeShare:
+class FreeShare(Frozen):
     """
     What random configurations of an arm meet.
 

@@ -15,6 +15,7 @@ from rrth_planner.collision.reference_checker import (
 )
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.frozen import Frozen
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.separation import seen_body, SeparationRules, speed_bound
 from rrth_planner.model.trajectory import part_of, Trajectory
@@ -32,7 +33,7 @@ _CORNERS = 0.5 * np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sights:
+class Sights(Frozen):
     """A wearer as he was published: when each body was measured, (n,) [s], and its boxes."""
 
     times: Array

@@ -8,7 +8,7 @@ import functools
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from rrth_planner.collision.bar_pairs import pair_names, pairs_of
 from rrth_planner.collision.box_tree import grown_groups, pack_boxes
 from rrth_planner.kernels import jit, layout
@@ -16,6 +16,7 @@ from rrth_planner.kernels.collision import arm_clearance, arm_validity, edge_con
 from rrth_planner.kernels.collision.bar_bar import colliding_pair
 from rrth_planner.kernels.collision.boxes import rows_of
 from rrth_planner.kernels.kinematics import generated_fk as chain
+from rrth_planner.kernels.vectors import is_within
 from rrth_planner.model.arm import (
     ArmModel,
     bar_names,
@@ -24,8 +25,9 @@ from rrth_planner.model.arm import (
     is_called,
     mount_bars,
 )
-from rrth_planner.model.arrays import Array, check_dof, FARTHEST
-from rrth_planner.model.errors import OptionsError
+from rrth_planner.model.arrays import Array, FARTHEST, float_array, float_number
+from rrth_planner.model.errors import OptionsError, RrthError
+from rrth_planner.model.frozen import Frozen, read_only
 from rrth_planner.model.joint_range import bounds_from
 from rrth_planner.model.reach import reach_table
 from rrth_planner.model.scene import Scene
@@ -43,9 +45,12 @@ FINEST = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class World:
+class World(Frozen):
     """
     What planners and certificates need, packed for the kernels.
+
+    Its methods take configurations as numpy does, array_like: lists, single precision, strided;
+    numbers that are not finite, and other shapes, raise an RrthError.
 
     Parameters
     ----------
@@ -93,17 +98,20 @@ class World:
     space: jit.Space = field(init=False)
 
     def __post_init__(self) -> None:
-        """Validate, and look up the addresses of the seams, entries as in `kernels.jit`."""
-        if not FINEST <= self.resolution < np.inf:
-            raise OptionsError(
-                f'resolution: {self.resolution}, expected a spacing from {FINEST:g} on [rad]'
-            )
+        """Validate, freeze, and look up the seams' addresses, entries as in `kernels.jit`."""
+        resolution = float_number(
+            self.resolution, 'resolution', 'rad', FINEST, FARTHEST, OptionsError
+        )
+        object.__setattr__(self, 'resolution', resolution)
+        object.__setattr__(self, 'lanes', read_only(np.asarray(self.lanes, dtype=np.int64)))
+        # Kernels take arrays of one type only: those of a copy are to be like these.
+        for name in ('robot', 'obstacles', 'bounds'):
+            array = np.asarray(getattr(self, name), dtype=np.float64, order='C')
+            object.__setattr__(self, name, read_only(array))
         found = jit.addresses(self.edge_check, self.chain, self.free_radius, self.contacts)
         object.__setattr__(self, 'functions', found)
-        arrays = [array.view() for array in (self.robot, self.obstacles, self.bounds)]
-        for array in arrays:
-            array.setflags(write=False)
-        object.__setattr__(self, 'space', jit.Space(found, float(self.resolution), *arrays))
+        space = jit.Space(found, resolution, self.robot, self.obstacles, self.bounds)
+        object.__setattr__(self, 'space', space)
 
     @property
     def ray_length(self) -> float:
@@ -115,65 +123,87 @@ class World:
         """How many numbers the chain writes of a configuration."""
         return int(self.robot[self.bounds.shape[1] + 1, layout.STRIDE])
 
-    def is_in_bounds(self, q: Array) -> bool:
+    def is_in_bounds(self, q: ArrayLike) -> bool:
         """Return whether a configuration, shape (dof,), respects the joints' limits."""
-        check_dof(q, self.bounds.shape[1], 'q')
-        return bool(((q >= self.bounds[0]) & (q <= self.bounds[1])).all())
+        return bool(is_within(self._configuration(q), self.bounds))
 
-    def is_valid(self, q: Array, ray_length: float | None = None) -> bool:
+    def is_valid(self, q: ArrayLike, ray_length: float | None = None) -> bool:
         """
         Return whether q, shape (dof,), is within limits and free, with a ray that long [m].
 
         A point on a map has no ray.
         """
-        return self.is_in_bounds(q) and self.is_free(q, ray_length)
+        q = self._configuration(q)
+        return bool(is_within(q, self.bounds)) and self._is_free(q, ray_length)
 
-    def is_free(self, q: Array, ray_length: float | None = None) -> bool:
+    def is_free(self, q: ArrayLike, ray_length: float | None = None) -> bool:
         """Return whether q, shape (dof,), is free, be it within the joints' limits or not."""
+        return self._is_free(self._configuration(q), ray_length)
+
+    def _is_free(self, q: Array, ray_length: float | None) -> bool:
         if self.chain is chain.NO_CHAIN:
             place = self.resolution, self.chain, self.robot, self.obstacles
             return bool(self.edge_check(q, q, *place))
-        ray = self.ray_length if ray_length is None else ray_length
+        ray = self._ray(ray_length)
         return bool(
             arm_validity.is_configuration_free(q, ray, self.chain, self.robot, self.obstacles)
         )
 
-    def is_edge_valid(self, q_from: Array, q_to: Array) -> bool:
+    def is_edge_valid(self, q_from: ArrayLike, q_to: ArrayLike) -> bool:
         """Return whether the straight motion between two configurations is proven free."""
+        q_from, q_to = self._configuration(q_from, 'q_from'), self._configuration(q_to, 'q_to')
         return bool(
-            self.is_in_bounds(q_from)
-            and self.is_in_bounds(q_to)
+            is_within(q_from, self.bounds)
+            and is_within(q_to, self.bounds)
             and self.edge_check(
                 q_from, q_to, self.resolution, self.chain, self.robot, self.obstacles
             )
         )
 
-    def colliding_bars(self, q: Array, ray_length: float | None = None) -> tuple[str, str] | None:
+    def colliding_bars(
+        self, q: ArrayLike, ray_length: float | None = None
+    ) -> tuple[str, str] | None:
         """Return the names of two bars that collide at q, shape (dof,), and must not; or None."""
+        q = self._configuration(q)
         if not self.pair_names:
             return None
-        check_dof(q, self.bounds.shape[1], 'q')
-        ray = self.ray_length if ray_length is None else ray_length
         points = np.empty(self.stride)
-        self.chain(np.ascontiguousarray(q), ray, points, 0)
+        self.chain(q, self._ray(ray_length), points, 0)
         pair = colliding_pair(points, 0, self.bounds.shape[1], self.robot)
         return self.pair_names[pair] if pair >= 0 else None
 
-    def clearances(self, q: Array, ray_length: float | None = None) -> Array:
+    def clearances(self, q: ArrayLike, ray_length: float | None = None) -> Array:
         """
         Return the least signed distances of the bars from the grown boxes, (n_bars, m) [m].
 
-        < 0: contact, minus the penetration depth. q has the shape (dof,), or (n, dof)
-        for the least over n configurations.
+        < 0: contact, minus the penetration depth. q has the shape (dof,), or (..., dof) for the
+        least over all those configurations [rad or m].
         """
-        check_dof(q, self.bounds.shape[1], 'q')
-        ray = self.ray_length if ray_length is None else ray_length
+        dof = self.bounds.shape[1]
+        q = float_array(q, (..., dof), 'q', 'rad or m')
+        if self.chain is chain.NO_CHAIN:
+            raise RrthError('clearances: of a point on a map, expected the world of an arm')
         distances = np.empty((len(self.bar_names), layout.LANES * len(self.obstacles)))
         arm_clearance.clearances(
-            np.atleast_2d(q), ray, self.chain, self.robot, self.obstacles, distances
+            q.reshape(-1, dof),
+            self._ray(ray_length),
+            self.chain,
+            self.robot,
+            self.obstacles,
+            distances,
         )
-        chosen: Array = distances[:, self.lanes]
+        chosen: Array = distances.take(self.lanes, axis=1)
         return chosen
+
+    def _configuration(self, q: ArrayLike, name: str = 'q') -> Array:
+        """Return a configuration as kernels take it, (dof,) [rad or m]."""
+        return float_array(q, (self.bounds.shape[1],), name, 'rad or m')
+
+    def _ray(self, length: float | None) -> float:
+        """Return a length of the pointing ray, by default the one that must stay clear [m]."""
+        if length is None:
+            return self.ray_length
+        return float_number(length, 'ray_length', 'm', 0.0)
 
 
 def arm_world(arm: ArmModel, scene: Scene, margin: float, ray_guard_length: float) -> World:
@@ -189,9 +219,10 @@ def arm_world(arm: ArmModel, scene: Scene, margin: float, ray_guard_length: floa
         A margin or a ray_guard_length that is negative, not a number or beyond 1e4 m.
 
     """
-    for name, value in (('margin', margin), ('ray_guard_length', ray_guard_length)):
-        if not 0.0 <= value <= FARTHEST:
-            raise OptionsError(f'{name}: {value}, expected a length from 0 to {FARTHEST:g} [m]')
+    margin = float_number(margin, 'margin', 'm', 0.0, FARTHEST, OptionsError)
+    ray_guard_length = float_number(
+        ray_guard_length, 'ray_guard_length', 'm', 0.0, FARTHEST, OptionsError
+    )
     robot, compiled_chain = arm_rows(arm, ray_guard_length)
     rows = np.empty((layout.BOX_ROWS, len(scene.boxes)))
     rows_of(scene.numbers, allowed_bars(arm, scene), mount_inverse(arm), margin + SLACK, rows)

@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from rrth_planner.io.entries import mapping, number, sequence
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.text_file import naming_file, parse_yaml, read_text, to_yaml
 from rrth_planner.model.arm import ArmModel, Capsule, NO_BARS, ROW
-from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
+from rrth_planner.model.arrays import Array, FARTHEST, float_array, frozen_array
 from rrth_planner.model.errors import ModelError, printable, shown
 from rrth_planner.model.rotation import pose_matrix, quaternion_xyzw
 
@@ -126,7 +127,7 @@ def _plain(numbers: Array) -> list[float]:
     return plain
 
 
-def arm_from_mapping(data: Mapping[str, Any], T_base_link: Array | None = None) -> ArmModel:
+def arm_from_mapping(data: Mapping[str, Any], T_base_link: ArrayLike | None = None) -> ArmModel:
     """
     Return the arm that a mapping describes, laid out as in `config/arm.yaml`.
 
@@ -146,7 +147,10 @@ def arm_from_mapping(data: Mapping[str, Any], T_base_link: Array | None = None) 
         _joint(i, joint) for i, joint in enumerate(sequence(given['joints'], 'joints', ModelError))
     ]
     mount = mapping(given['mount'], 'mount', POSE, ModelError, ('frame_0', 'capsules'))
-    T_base_mount = _placed(mount, 'mount') if T_base_link is None else T_base_link
+    if T_base_link is None:
+        T_base_mount = _placed(mount, 'mount')
+    else:
+        T_base_mount = float_array(T_base_link, (4, 4), 'T_base_link', 'm', ModelError)
     if 'frame_0' in mount:
         label = 'mount frame_0'
         frame_0 = mapping(mount['frame_0'], label, POSE, ModelError)
@@ -255,7 +259,7 @@ def _numbers(given: Mapping[str, Any], label: str, units: Mapping[str, str]) -> 
     }
 
 
-def load_arm(path: str | Path | None = None, T_base_link: Array | None = None) -> ArmModel:
+def load_arm(path: str | Path | None = None, T_base_link: ArrayLike | None = None) -> ArmModel:
     """
     Return the arm that a YAML file describes; None or empty: the packaged one, `config/arm.yaml`.
 
@@ -271,7 +275,7 @@ def load_arm(path: str | Path | None = None, T_base_link: Array | None = None) -
     return arm_from_text(read_text(file), file, T_base_link)
 
 
-def arm_from_text(text: str, file: str | Path, T_base_link: Array | None = None) -> ArmModel:
+def arm_from_text(text: str, file: str | Path, T_base_link: ArrayLike | None = None) -> ArmModel:
     """Return the arm that the text of a YAML file describes, as `load_arm` does."""
     if text.lstrip().startswith('<'):
         raise ModelError(

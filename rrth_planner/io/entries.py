@@ -3,9 +3,11 @@
 """Validation of the entries of files: each has the expected type, or is rejected."""
 
 from collections.abc import Collection, Mapping
-import sys
+import math
 from typing import Any
 
+import numpy as np
+from rrth_planner.model.arrays import float_number
 from rrth_planner.model.errors import RrthError, shown
 
 
@@ -43,17 +45,17 @@ def sequence(value: Any, name: str, error: type[RrthError]) -> list[Any]:
 
 def number(value: Any, name: str, unit: str, error: type[RrthError]) -> float:
     """Return a finite number, or raise; true and "1" are none."""
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not is_number or not abs(value) <= sys.float_info.max:
+    found = float_number(value, name, unit, error=error)
+    if not math.isfinite(found):
         raise error(f'{name}: {shown(value)}, expected a number [{unit}]')
-    return float(value)
+    return found
 
 
 def whole(value: Any, name: str, error: type[RrthError]) -> int:
     """Return a whole number, or raise."""
-    if isinstance(value, bool) or not isinstance(value, int):
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
         raise error(f'{name}: {shown(value)}, expected a whole number')
-    return value
+    return int(value)
 
 
 def text(value: Any, name: str, error: type[RrthError]) -> str:

@@ -4,10 +4,13 @@
 
 from collections.abc import Callable
 import contextlib
+import functools
 import hashlib
+from importlib import import_module
 import logging
 import os
 from pathlib import Path
+from pickle import PicklingError
 import sys
 from typing import Any, NamedTuple
 import warnings
@@ -253,11 +256,13 @@ class FirstClass:
     A kernel to be handed to other kernels, its type and address looked up once.
 
     numba looks both up anew at each call that passes the bare kernel, which costs more (70 us)
-    than most plans spend in the call.
+    than most plans spend in the call. Its copies are itself, and in another process it is the
+    kernel of the same name: an address means nothing there, and a bare kernel would be compiled
+    anew, with all that it calls. made_by: what returns a kernel that no module has, and from what.
     """
 
-    def __init__(self, compiled: Any) -> None:
-        self.compiled = compiled
+    def __init__(self, compiled: Any, made_by: tuple[Any, ...] = ()) -> None:
+        self.compiled, self._made_by = compiled, made_by
         (self._signature,) = compiled.nopython_signatures
         # Of the compiled code, for `functions`.
         self.address = int(_get_wrapper_address(compiled, self._signature))
@@ -276,10 +281,36 @@ class FirstClass:
         """Call the kernel from Python."""
         return self.compiled(*arguments)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Be copied and sent by name."""
+        if self._made_by:
+            made_by, *arguments = self._made_by
+            return made_by, tuple(arguments)
+        module, name = self.compiled.__module__, self.compiled.__qualname__
+        if '<locals>' in name:
+            raise PicklingError(f'kernel {name}: of a function, expected one of a module')
+        return _seam_named, (module, name)
 
-def first_class(compiled: Any) -> Any:
-    """Return a kernel, of the type of a seam, in the form in which others are handed it."""
-    return compiled if config.DISABLE_JIT else FirstClass(compiled)
+
+_SEAMS: dict[Any, FirstClass] = {}
+
+
+def first_class(compiled: Any, *made_by: Any) -> Any:
+    """
+    Return a kernel, of the type of a seam, in the form in which others are handed it.
+
+    made_by: a function, and arguments for which it returns the kernel, where no module has it.
+    """
+    if config.DISABLE_JIT:
+        return compiled
+    if compiled not in _SEAMS:
+        _SEAMS[compiled] = FirstClass(compiled, made_by)
+    return _SEAMS[compiled]
+
+
+def _seam_named(module: str, name: str) -> Any:
+    """Return the kernel of a module in the form in which others are handed it."""
+    return first_class(getattr(import_module(module), name))
 
 
 def address(seam: Any) -> Any:
@@ -287,6 +318,8 @@ def address(seam: Any) -> Any:
     return seam if config.DISABLE_JIT else seam.__wrapper_address__()
 
 
+# Most worlds have the same ones.
+@functools.lru_cache(maxsize=64)
 def addresses(*seams: Any) -> Any:
     """Return what `functions` holds: the addresses of compiled seams."""
     if config.DISABLE_JIT:

@@ -278,5 +278,17 @@ def require_kernels(names: frozenset[str]) -> None:
 
 
 def use_slim_libraries() -> None:
-    """Have numba load all further code of this process so."""
-    cpu_target.target_context.codegen()._library_class = SlimLibrary
+    """
+    Have numba load all further code of this process so.
+
+    Once: what numba has unpickled it does not unpickle again, so kernels that are loaded a second
+    time would be of the types of the first.
+    """
+    codegen = cpu_target.target_context.codegen()
+    if codegen._library_class is not JITCodeLibrary:
+        raise ImportError(
+            'rrth_planner.kernels: imported a second time in this process, expected once, since '
+            'compiled code is not loaded twice: leave rrth_planner.kernels and its modules in '
+            'sys.modules, or start a new process'
+        )
+    codegen._library_class = SlimLibrary

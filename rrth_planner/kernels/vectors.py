@@ -1,10 +1,10 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Small vectors: copies, sorting, distances, lengths of paths."""
+"""Small vectors: copies, sorting, bounds, distances, lengths of paths."""
 
 import math
 
-from numba.core.types import float64, int64, void
+from numba.core.types import boolean, float64, int64, void
 from rrth_planner.kernels.jit import kernel, MAT, OUT_VEC, VEC
 
 
@@ -33,6 +33,15 @@ def distance(p, q):
     for k in range(p.shape[0]):
         total += (p[k] - q[k]) ** 2
     return math.sqrt(total)
+
+
+@kernel(boolean(VEC, MAT), is_short=True)
+def is_within(q, bounds):
+    """Return whether a configuration is within bounds, (2, dof): lower, upper; no NaN is."""
+    found = True
+    for k in range(q.shape[0]):
+        found &= bounds[0, k] <= q[k] <= bounds[1, k]
+    return found
 
 
 @kernel(void(VEC, VEC, float64, OUT_VEC))

@@ -7,9 +7,11 @@ import functools
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 from rrth_planner.kernels.layout import MAX_BARS, MAX_DOF, NO_BAR
-from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
+from rrth_planner.model.arrays import Array, FARTHEST, float_array, float_number, frozen_array
 from rrth_planner.model.errors import ModelError, printable
+from rrth_planner.model.frozen import Frozen
 
 # Radius of a row whose offsets are no bars.
 NO_BARS = NO_BAR
@@ -18,7 +20,7 @@ ROW = {'alpha': 'rad', 'a': 'm', 'offset': 'rad', 'd': 'm'}
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Capsule:
+class Capsule(Frozen):
     """
     All points within a radius of a straight line that is fixed to a link.
 
@@ -52,14 +54,12 @@ class Capsule:
         label = f'capsule "{self.name}"'
         ends = frozen_array(self.ends, (2, 3), f'{label}: ends', 'm', ModelError, FARTHEST)
         object.__setattr__(self, 'ends', ends)
-        if not 0.0 <= self.radius <= FARTHEST:
-            raise ModelError(
-                f'{label}: radius {self.radius}, expected a length from 0 to {FARTHEST:g} [m]'
-            )
+        radius = float_number(self.radius, f'{label}: radius', 'm', 0.0, FARTHEST, ModelError)
+        object.__setattr__(self, 'radius', radius)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class ArmModel:
+class ArmModel(Frozen):
     """
     A serial arm in Craig's convention, `T = Rx(alpha) Tx(a) Rz(theta + offset) Tz(d)`.
 
@@ -273,14 +273,15 @@ def is_called(box: str, name: str) -> bool:
     return box == name or (box.startswith(name) and box[len(name)] in '/[')
 
 
-def forward_kinematics(arm: ArmModel, q: Array) -> Array:
+def forward_kinematics(arm: ArmModel, q: ArrayLike) -> Array:
     """
     Return the poses of the link frames and of the tool in the base frame.
 
     (..., dof) [rad or m] -> (..., dof + 1, 4, 4) [m]; the last one is the tool's: the pointing ray
-    leaves its origin along its +z.
+    leaves its origin along its +z. Numbers that are not finite, and another number of joints,
+    raise an RrthError.
     """
-    poses = link_poses(arm, q)
+    poses = link_poses(arm, float_array(q, (..., arm.dof), 'q', 'rad or m'))
     T = arm.T_base_mount
     for i in range(arm.dof + 1):
         T = poses[..., i, :, :] = T @ poses[..., i, :, :]
@@ -289,9 +290,9 @@ def forward_kinematics(arm: ArmModel, q: Array) -> Array:
 
 def link_poses(arm: ArmModel, q: Array) -> Array:
     """Return the pose of each link frame in the one before, as `forward_kinematics` [m]."""
-    q = np.asarray(q, dtype=np.float64)
     offset, slides, parts, tool = _link_parts(arm)
-    theta, terms = q + offset, np.ones((*q.shape, 1, 3))
+    theta, terms = q + offset, np.empty((*q.shape, 1, 3))
+    terms[..., 0] = 1.0
     np.cos(theta, out=terms[..., 0, 1])
     np.sin(theta, out=terms[..., 0, 2])
     if slides:
@@ -337,15 +338,15 @@ def tool_in_last_link(arm: ArmModel, points: Array) -> Array:
     return result
 
 
-def tool_pose(arm: ArmModel, q: Array) -> Array:
+def tool_pose(arm: ArmModel, q: ArrayLike) -> Array:
     """Return the tool's pose in the base frame, its +z the ray, (..., dof) -> (..., 4, 4) [m]."""
     pose: Array = forward_kinematics(arm, q)[..., -1, :, :]
     return pose
 
 
-def reach_to(arm: ArmModel, target: Array, q: Array) -> float:
+def reach_to(arm: ArmModel, target: ArrayLike, q: ArrayLike) -> float:
     """Return the distance from the tool to a target of the base frame [m]."""
-    return float(np.linalg.norm(target - tool_pose(arm, q)[:3, 3]))
+    return float(np.linalg.norm(_point(target) - tool_pose(arm, q)[:3, 3]))
 
 
 def capsule_ends(arm: ArmModel, q: Array) -> Array:
@@ -355,16 +356,20 @@ def capsule_ends(arm: ArmModel, q: Array) -> Array:
     return np.array(ends).reshape(-1, 2, 3)
 
 
-def pointing_angle(arm: ArmModel, q: Array, target: Array) -> float:
+def pointing_angle(arm: ArmModel, q: ArrayLike, target: ArrayLike) -> float:
     """Return the angle between the ray and the direction from tool to target [rad]."""
     T = tool_pose(arm, q)
-    v, z = target - T[:3, 3], T[:3, 2]
+    v, z = _point(target) - T[:3, 3], T[:3, 2]
     return math.atan2(float(np.linalg.norm(np.cross(z, v))), float(v @ z))
 
 
-def pointing_error(arm: ArmModel, q: Array, target: Array) -> float:
+def pointing_error(arm: ArmModel, q: ArrayLike, target: ArrayLike) -> float:
     """Return the distance of the pointing ray from a target of the base frame [m]."""
     T = tool_pose(arm, q)
-    v = target - T[:3, 3]
+    v = _point(target) - T[:3, 3]
     reach = max(0.0, float(v @ T[:3, 2]))
     return float(np.linalg.norm(v - reach * T[:3, 2]))
+
+
+def _point(target: ArrayLike) -> Array:
+    return float_array(target, (3,), 'target', 'm')

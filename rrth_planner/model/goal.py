@@ -5,15 +5,16 @@
 from dataclasses import dataclass
 import math
 
-from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
+from rrth_planner.model.arrays import Array, FARTHEST, float_number, frozen_array
 from rrth_planner.model.errors import OptionsError, SceneError
+from rrth_planner.model.frozen import Frozen
 
 # Of a motion, as a request may ask for it [s].
 LONGEST_DURATION = 60.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PointingGoal:
+class PointingGoal(Frozen):
     """
     A point of the base frame that the pointing ray has to meet, array_like of shape (3,) [m].
 
@@ -60,6 +61,9 @@ class PacedGoal(PointingGoal):
         """Validate and freeze."""
         # Not super(): a class with slots is made anew, and that names the one before.
         PointingGoal.__post_init__(self)
+        for name, unit in (('max_velocity', 'rad/s'), ('min_duration', 's')):
+            value = float_number(getattr(self, name), name, unit, error=OptionsError)
+            object.__setattr__(self, name, value)
         if not self.max_velocity > 0.0:
             raise OptionsError(
                 f'max_velocity: {self.max_velocity:g}, expected a velocity > 0 [rad/s]'

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from rrth_planner.kernels import vectors
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import RrthError
+from rrth_planner.model.frozen import Frozen
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Path:
+class Path(Frozen):
     """Straight joint motions between one or more waypoints, array_like of shape (n, dof) [rad]."""
 
     waypoints: Array

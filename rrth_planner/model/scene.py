@@ -9,10 +9,11 @@ import numpy as np
 from rrth_planner.kernels.layout import MAX_BOXES, NUMBERS, ORTHOGONAL, ROTATION, SIZE
 from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.model.errors import printable, SceneError
+from rrth_planner.model.frozen import Frozen
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Box:
+class Box(Frozen):
     """
     One part of the wearer.
 

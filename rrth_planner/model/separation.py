@@ -11,6 +11,7 @@ import numpy as np
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import CUT, OptionsError, SceneError
+from rrth_planner.model.frozen import Frozen
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import MotionLimits
 
@@ -162,7 +163,7 @@ def _words(name: str) -> list[str]:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SeenBody:
+class SeenBody(Frozen):
     """
     The wearer as he was last seen, at some instant.
 

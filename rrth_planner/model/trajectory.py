@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
+from rrth_planner.model.arrays import Array, FARTHEST, float_array, frozen_array
 from rrth_planner.model.errors import OptionsError, RrthError
+from rrth_planner.model.frozen import Frozen
 
 # Greatest speed of a joint at rest [rad/s].
 REST_SPEED = 0.01
@@ -21,7 +22,7 @@ NEAR_POINT = 1e-5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class MotionLimits:
+class MotionLimits(Frozen):
     """
     Greatest magnitudes for each joint, array_like of shape (dof,) [rad/s, rad/s^2, rad/s^3].
 
@@ -126,12 +127,29 @@ def _of_bytes(n: int, data: bytes) -> Trajectory:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class MotionState:
-    """Positions, velocities and accelerations of the joints, (dof,) [rad, rad/s, rad/s^2]."""
+class MotionState(Frozen):
+    """
+    Positions, velocities, accelerations of the joints, array_like (dof,) [rad, rad/s, rad/s^2].
+
+    Raises
+    ------
+    RrthError
+        Arrays of different lengths, numbers that are not finite.
+
+    """
 
     positions: Array
     velocities: Array
     accelerations: Array
+
+    def __post_init__(self) -> None:
+        """Validate and freeze."""
+        dof: int | None = None
+        units = {'positions': 'rad', 'velocities': 'rad/s', 'accelerations': 'rad/s^2'}
+        for name, unit in units.items():
+            value = frozen_array(getattr(self, name), (dof,), name, unit, RrthError)
+            dof = len(value)
+            object.__setattr__(self, name, value)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -190,9 +208,13 @@ def sample(trajectory: Trajectory, times: ArrayLike) -> tuple[Array, Array, Arra
     """
     Return the state at some times, (m,) [s]; at rest before the first and after the last point.
 
-    Positions [rad], velocities [rad/s] and accelerations [rad/s^2], each (m, dof).
+    Positions [rad], velocities [rad/s] and accelerations [rad/s^2], each (m, dof); of a single
+    time, (): (1, dof).
     """
-    t = np.atleast_1d(np.asarray(times, dtype=np.float64))
+    t = float_array(times, (...,), 'times', 's')
+    if t.ndim != 1:
+        # One time, or what is no list of times.
+        t = float_array(t[None], (None,), 'times', 's')
     if len(trajectory.times) == 1:
         held = np.repeat(trajectory.positions, len(t), axis=0)
         return held, np.zeros_like(held), np.zeros_like(held)

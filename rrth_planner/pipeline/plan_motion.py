@@ -6,8 +6,10 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 import functools
 import time
+from typing import cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 from rrth_planner.collision.certificate import certify, least_clearance
 from rrth_planner.collision.penetration import box_depths
 from rrth_planner.collision.violation import Disagreement
@@ -51,7 +53,7 @@ _world_of = functools.lru_cache(maxsize=8)(arm_world)
 def plan_motion(
     arm: ArmModel,
     scene: Scene,
-    q_start: Array,
+    q_start: ArrayLike,
     goal: PointingGoal,
     limits: MotionLimits,
     options: TreeOptions,
@@ -77,7 +79,7 @@ def plan_motion(
         Passes `pointing_goals.check_pointing_arm`.
     scene : Scene
         The wearer in the base frame.
-    q_start : ndarray, shape (dof,)
+    q_start : array_like, shape (dof,)
         Where the arm is, at rest [rad].
     options : TreeOptions
         Their class is the choice of the algorithm.
@@ -122,7 +124,8 @@ def plan_motion(
     question = PlanQuestion(
         arm=arm,
         scene=scene,
-        q_start=q_start,
+        # Checked there.
+        q_start=cast(Array, q_start),
         goal=goal,
         limits=limits,
         options=options,

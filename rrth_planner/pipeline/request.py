@@ -7,10 +7,12 @@ from dataclasses import dataclass, fields
 from operator import attrgetter
 from typing import Any
 
+import numpy as np
 from rrth_planner.collision.distance_library import LIBRARIES
 from rrth_planner.model.arm import ArmModel
-from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
+from rrth_planner.model.arrays import Array, FARTHEST, float_number, frozen_array
 from rrth_planner.model.errors import OptionsError, shown
+from rrth_planner.model.frozen import Frozen
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.separation import SeparationRules
@@ -19,7 +21,7 @@ from rrth_planner.planning.options import TreeOptions
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class PlanQuestion:
+class PlanQuestion(Frozen):
     """
     The arguments of `pipeline.plan_motion` that determine its result, by name.
 
@@ -82,21 +84,17 @@ class PlanQuestion:
             if width != dof:
                 raise OptionsError(f'{name}: of {width} joints, expected those of the arm, {dof}')
         for name in ('margin', 'ray_guard_length', 'escape_depth', 'reserve'):
-            value = getattr(self, name)
-            if not 0.0 <= value <= FARTHEST:
-                raise OptionsError(
-                    f'{name}: {value}, expected a length from 0 to {FARTHEST:g} [m]'
-                )
-        if not 0.0 <= self.body_age <= FARTHEST:
-            raise OptionsError(
-                f'body_age: {self.body_age}, expected a time from 0 to {FARTHEST:g} [s]'
-            )
+            value = float_number(getattr(self, name), name, 'm', 0.0, FARTHEST, OptionsError)
+            object.__setattr__(self, name, value)
+        age = float_number(self.body_age, 'body_age', 's', 0.0, FARTHEST, OptionsError)
+        object.__setattr__(self, 'body_age', age)
         if self.second_checker not in LIBRARIES:
             raise OptionsError(
                 f'second_checker: {shown(self.second_checker)}, expected {" or ".join(LIBRARIES)}'
             )
-        if self.seed < 0:
-            raise OptionsError(f'seed: {self.seed}, expected a whole number >= 0')
+        is_whole = isinstance(self.seed, int | np.integer) and not isinstance(self.seed, bool)
+        if not is_whole or self.seed < 0:
+            raise OptionsError(f'seed: {shown(self.seed)}, expected a whole number >= 0')
 
 
 _NAMES = tuple(field.name for field in fields(PlanQuestion))

@@ -12,6 +12,7 @@ from rrth_planner.kernels.kinematics import generated_fk
 from rrth_planner.kernels.layout import MAX_DOF
 from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.model.errors import printable, SceneError
+from rrth_planner.model.frozen import Frozen
 from rrth_planner.planning.problem import PlanningProblem
 
 EDGE_CHECK = jit.first_class(map_validity.is_edge_free)
@@ -21,7 +22,7 @@ FREE_RADIUS = jit.first_class(map_validity.free_radius)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class BoxMap:
+class BoxMap(Frozen):
     """
     A start, a goal and the boxes between them; a point may be on a face of a box, not inside.
 
@@ -55,7 +56,12 @@ class BoxMap:
         dof = bounds.shape[1]
         if not 1 <= dof <= MAX_DOF:
             raise SceneError(f'{name}: bounds of {dof} dimensions, expected 1 to {MAX_DOF}')
-        obstacles = self.obstacles if len(self.obstacles) else np.empty((0, 2, dof))
+        obstacles = self.obstacles
+        has_none = (
+            obstacles.size == 0 if isinstance(obstacles, np.ndarray) else obstacles in ([], ())
+        )
+        if has_none:
+            obstacles = np.empty((0, 2, dof))
         for field, value, shape in (
             ('bounds', bounds, (2, dof)),
             ('obstacles', obstacles, (None, 2, dof)),

@@ -9,13 +9,15 @@ from importlib import import_module
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 from rrth_planner.collision.world import World
 from rrth_planner.kernels import jit
 from rrth_planner.kernels.kinematics import pan_tilt_ik
 from rrth_planner.kernels.kinematics.goal_selection import find_goals
 from rrth_planner.model.arm import ArmModel, forward_kinematics
-from rrth_planner.model.arrays import Array, check_dof
+from rrth_planner.model.arrays import Array, check_dof, float_array
 from rrth_planner.model.errors import ModelError
+from rrth_planner.model.frozen import Frozen
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.joint_range import turns_near
 from rrth_planner.planning.problem import PlanningProblem
@@ -62,7 +64,7 @@ CLOSED_FORM = PointingKernels(
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class GoalSet:
+class GoalSet(Frozen):
     """
     Goal configurations of a target, nearest first.
 
@@ -142,7 +144,7 @@ def target_in_mount(arm: ArmModel, goal: PointingGoal) -> Array:
 
 
 def goal_configurations(
-    arm: ArmModel, goal: PointingGoal, world: World, q_near: Array, n_draws: int
+    arm: ArmModel, goal: PointingGoal, world: World, q_near: ArrayLike, n_draws: int
 ) -> GoalSet:
     """
     Return the free configurations that aim at a target, nearest to q_near first.
@@ -155,13 +157,18 @@ def goal_configurations(
     ----------
     arm : ArmModel
         Passes `check_pointing_arm`.
-    q_near : ndarray, shape (dof,)
+    q_near : array_like, shape (dof,)
         [rad].
     n_draws : int
         Half of the number of candidates, of which there are more where joints turn freely.
 
+    Raises
+    ------
+    RrthError
+        A q_near that is no (dof,) finite numbers, or the world of another number of joints.
+
     """
-    check_dof(q_near, arm.dof, 'q_near')
+    q_near = float_array(q_near, (arm.dof,), 'q_near', 'rad')
     check_dof(world.bounds, arm.dof, 'world')
     bounds = turns_near(arm, world.bounds, q_near, 1.0)
     found = _goals_within(arm, goal, world, bounds, q_near, n_draws)
@@ -238,7 +245,11 @@ def _with_other_turns(arm: ArmModel, world: World, q_near: Array, found: GoalSet
 
 
 def pointing_problem(
-    arm: ArmModel, goal: PointingGoal, world: World, q_start: Array, goals: GoalSet | None = None
+    arm: ArmModel,
+    goal: PointingGoal,
+    world: World,
+    q_start: ArrayLike,
+    goals: GoalSet | None = None,
 ) -> PlanningProblem:
     """
     Return the planning problem of a pointing goal.
@@ -249,7 +260,7 @@ def pointing_problem(
     ----------
     world : World
         Of that arm.
-    q_start : ndarray, shape (dof,)
+    q_start : array_like, shape (dof,)
         [rad].
     goals : GoalSet, optional
         None: those that `goal_configurations` finds near q_start.
@@ -258,8 +269,11 @@ def pointing_problem(
     ------
     ModelError
         The ray of the arm sweeps no more than a surface; only where goals are to be found.
+    RrthError
+        A q_start that is no (dof,) finite numbers; no goal that is free.
 
     """
+    q_start = float_array(q_start, (arm.dof,), 'q_start', 'rad')
     if goals is None:
         check_pointing_arm(arm)
         goals = goal_configurations(arm, goal, world, q_start, FEW)

@@ -11,13 +11,14 @@ from rrth_planner.kernels import jit
 from rrth_planner.kernels.search import tree
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import RrthError
+from rrth_planner.model.frozen import Frozen
 
 NOWHERE = frozen_array(np.zeros(3), (3,), 'target', 'm', RrthError)
 STAY = jit.first_class(tree.stay)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class PlanningProblem:
+class PlanningProblem(Frozen):
     """
     Find a path from q_start to any of the goals.
 

@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import RrthError
+from rrth_planner.model.frozen import Frozen
 from rrth_planner.model.path import Path
 from rrth_planner.model.status import PlanStatus
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Tree:
+class Tree(Frozen):
     """
     Configurations and their parents.
 
@@ -33,8 +34,7 @@ class Tree:
 
     def __post_init__(self) -> None:
         """Freeze."""
-        dof = np.shape(self.nodes)[-1]
-        nodes = frozen_array(self.nodes, (None, dof), 'nodes', 'rad', RrthError)
+        nodes = frozen_array(self.nodes, (None, None), 'nodes', 'rad', RrthError)
         parents = np.array(self.parents, dtype=np.int64)
         parents.setflags(write=False)
         # A parent that is out of place is greater than its own index, or as great.

@@ -5,6 +5,7 @@
 import numpy as np
 from rrth_planner.collision.certificate import Certificate, certify
 from rrth_planner.collision.world import World
+from rrth_planner.model.arrays import check_dof, float_number
 from rrth_planner.model.trajectory import MotionLimits, part_of, sample, Trajectory
 from rrth_planner.timing.fast_stop import fast_stop
 
@@ -21,11 +22,19 @@ def brake(trajectory: Trajectory, time: float, limits: MotionLimits) -> Trajecto
     what the trajectory itself does up to there, where that is more; jerks only up to rounding,
     which in pieces below 0.1 ms exceeds that. Its times are whole nanoseconds from 0; before the
     start of the motion and after its end [s] the arm stands still, and it is a single point.
+
+    Raises
+    ------
+    RrthError
+        A time that is no number, or limits of another number of joints.
+
     """
+    time = float_number(time, 'time', 's')
+    check_dof(trajectory.positions, len(limits.velocity), 'trajectory')
     if not 0.0 < time < trajectory.duration:
         return part_of(trajectory, time, time)
     stop = fast_stop(trajectory, time, limits, lead=0.0)
-    state = sample(trajectory, [time])
+    state = sample(trajectory, np.array([time]))
     if np.abs(state[2] - stop.accelerations[:1]).max() > ROUNDING:
         # At a point of the trajectory, whose jerk jumps: by the piece that follows.
         return stop

@@ -8,6 +8,7 @@ import numpy as np
 from rrth_planner.collision.world import World
 from rrth_planner.kernels.collision import arm_validity
 from rrth_planner.model.arrays import Array, check_dof
+from rrth_planner.model.frozen import Frozen
 from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import MotionLimits
 
@@ -22,7 +23,7 @@ TINY = 1e-300
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Blend:
+class Blend(Frozen):
     """
     A quartic from `half_length` before a corner to as much after it, in tau from 0 to 1.
 

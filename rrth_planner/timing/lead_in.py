@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from rrth_planner.kernels.trajectory.speed_profile import ramp_time
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.frozen import Frozen
 from rrth_planner.model.trajectory import MotionLimits, MotionState, StartState, Trajectory
 from rrth_planner.timing.braking import brake
 from rrth_planner.timing.parameterization import peaks
@@ -20,7 +21,7 @@ RESERVE = 0.99
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class LeadIn:
+class LeadIn(Frozen):
     """
     From a moving state to constant velocity, and the configuration where a straight stop ends.
 

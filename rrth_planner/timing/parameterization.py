@@ -4,7 +4,7 @@
 
 import numpy as np
 from rrth_planner.kernels.trajectory import quintics, timed_path
-from rrth_planner.model.arrays import Array, check_dof
+from rrth_planner.model.arrays import Array, check_dof, float_number
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import MotionLimits, piece_coefficients, Trajectory
@@ -60,6 +60,7 @@ def parameterize(
     """
     q = path.waypoints
     check_dof(q, len(limits.velocity), 'path')
+    v_start = float_number(v_start, 'v_start', 'rad/s', 0.0)
     n_corners = max(0, len(q) - 2)
     if len(blends) != n_corners:
         raise RrthError(f'blends: {len(blends)}, expected one for each of {n_corners} corners')

@@ -16,6 +16,7 @@ from rrth_planner.kernels.trajectory.rate_profile import (
     write_scaled,
 )
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.frozen import Frozen
 from rrth_planner.model.trajectory import MotionLimits, piece_coefficients, Trajectory
 
 # Derivatives of a rate below that are not worth a change [1/s]: it would end within 0.2 ms, in
@@ -24,7 +25,7 @@ NO_SLOPE = 5e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RateProfile:
+class RateProfile(Frozen):
     """
     How far within a motion an arm is from some instant on, and at which rate it executes it.
 

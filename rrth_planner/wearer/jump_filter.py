@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.frozen import Frozen
 from rrth_planner.wearer.posture import Posture
 
 # A posture that came so long after the one before does not say what jumps [s].
@@ -14,7 +15,7 @@ LONGEST_GAP = 0.2
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class FilteredPosture:
+class FilteredPosture(Frozen):
     """
     A posture without jumps, and what is needed to filter the next one.
 

@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import ModelError
+from rrth_planner.model.frozen import Frozen
 
 Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Link:
+class Link(Frozen):
     """
     A link, and the joint that leads to it.
 

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import SceneError
+from rrth_planner.model.frozen import Frozen
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Posture:
+class Posture(Frozen):
     """
     Where the points of a skeleton are, in the frame of the tracker.
 
@@ -35,7 +36,7 @@ class Posture:
     rotations: Array | None = None
 
     def __post_init__(self) -> None:
-        """Validate."""
+        """Validate and freeze."""
         n = len(self.names)
         if len(set(self.names)) < n:
             twice = next(name for name in self.names if self.names.count(name) > 1)
@@ -44,3 +45,4 @@ class Posture:
             value = getattr(self, name)
             if value is not None and np.shape(value) != shape:
                 raise SceneError(f'{name}: shape {np.shape(value)}, expected {shape}')
+        Frozen.__post_init__(self)

@@ -8,6 +8,7 @@ import math
 import numpy as np
 from rrth_planner.model.arrays import Array, FARTHEST
 from rrth_planner.model.errors import printable, RecordError
+from rrth_planner.model.frozen import Frozen
 from rrth_planner.wearer.posture import Posture
 
 # Rotations closer to each other than this, or to half a turn, have no axis [-].
@@ -17,7 +18,7 @@ SAME_FRAME = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class RecordedPerson:
+class RecordedPerson(Frozen):
     """
     Where the points of a skeleton were, at a fixed rate, in the frame of the tracker.
 

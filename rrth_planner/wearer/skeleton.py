@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import printable, SceneError, shown
+from rrth_planner.model.frozen import Frozen
 
 # The axes of boxes and of the base frame, in this order.
 AXES = ('forward', 'left', 'up')
@@ -31,7 +32,7 @@ LEAST_STATURE, MOST_STATURE = 0.5, 2.8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Joint:
+class Joint(Frozen):
     """
     A joint of the wearer: the mean of points of the tracker, or a place in one of its frames.
 
@@ -96,7 +97,7 @@ class Direction:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Part:
+class Part(Frozen):
     """
     A part of the wearer: the box round joints, with margins, turned as directions say.
 
@@ -148,7 +149,7 @@ class Part:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Bone:
+class Bone(Frozen):
     """
     What a person has between two joints, by which a posture is judged.
 
@@ -188,7 +189,7 @@ class Bone:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FrameBase:
+class FrameBase(Frozen):
     """
     The base frame of a wearer whose chest is a frame of the tracker.
 
@@ -216,7 +217,7 @@ class FrameBase:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointBase:
+class JointBase(Frozen):
     """
     The base frame of a wearer of whom there are points only.
 
@@ -249,7 +250,7 @@ class JointBase:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Skeleton:
+class Skeleton(Frozen):
     """
     How the points of a tracker become boxes round the wearer.
 

@@ -272,7 +272,7 @@ del_ = object()
         (('question', 'limits', 'jerk'), [1.0] * 3, 'max_jerk: shape (3,), expected (4)'),
         (('question', 'scene', 'boxes'), 7, 'scene: boxes: 7, expected a list'),
         (('question', 'scene', 'boxes'), [7], 'scene: boxes[0]: 7, expected a mapping'),
-        (('question', 'body_age'), -1.0, 'body_age: -1.0, expected a time from 0'),
+        (('question', 'body_age'), -1.0, 'body_age: -1.0, expected a number from 0'),
         (('question', 'rules'), {}, 'rules: no contact_speed, body_speeds, body_error'),
         (('question', 'rules', 'body_speeds'), [['hand']], 'rules: body_speeds'),
         (('question', 'rules', 'contact_speed'), -1.0, 'contact_speed: -1.0, expected 0 to 100'),

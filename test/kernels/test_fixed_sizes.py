@@ -353,7 +353,7 @@ def test_the_queue_and_the_points_of_a_proof_hold_all_of_its_nodes():
 def test_a_proof_that_would_cut_bars_into_too_many_parts_is_rejected(resolution):
     world = wearer_world()
     replace(world, resolution=FINEST)
-    with pytest.raises(OptionsError, match=r'resolution: .*, expected a spacing from 1e-09 on'):
+    with pytest.raises(OptionsError, match=r'resolution: .*, expected a number from 1e-09'):
         replace(world, resolution=resolution)
 
 

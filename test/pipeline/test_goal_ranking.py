@@ -102,7 +102,7 @@ def test_without_a_wearer_the_nearest_goal_is_the_soonest():
 
 @pytest.mark.parametrize('age', [-1.0, np.nan, np.inf])
 def test_an_age_that_is_none_is_rejected(age):
-    with pytest.raises(OptionsError, match='body_age: .* expected a time from 0'):
+    with pytest.raises(OptionsError, match='body_age: .* expected a number from 0'):
         plan_motion(
             *(ARM, wearer(), FOLDED, PointingGoal((1.0, 0.0, 0.0)), limits(), RRTHOptions()),
             margin=MARGIN,

@@ -247,5 +247,5 @@ def chain_of(rows: Any) -> Any:
         module = ModuleType(f'rrth_planner.kernels.chain_{digest}')
         sys.modules[module.__name__] = module
         exec(compile(text, f'<chain_{digest}>', 'exec'), vars(module))  # noqa: S102
-        _COMPILED[digest] = first_class(module.chain)
+        _COMPILED[digest] = first_class(module.chain, chain_of, rows)
     return _COMPILED[digest]

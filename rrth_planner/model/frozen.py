@@ -1,0 +1,43 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Values with arrays that cannot be changed, and whose copies are like them."""
+
+from dataclasses import fields
+from typing import Any, ClassVar
+
+import numpy as np
+
+
+class Frozen:
+    """
+    Base of the frozen dataclasses that hold arrays.
+
+    numpy copies and unpickles read-only arrays as writable ones. So a copy, or what arrives in
+    another process, is made as the original was: by the class, from the same arguments.
+    """
+
+    __slots__ = ()
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    def __post_init__(self) -> None:
+        """Hold all arrays read-only; a class that checks its own says so itself."""
+        for name in self.__dataclass_fields__:
+            value = getattr(self, name)
+            if isinstance(value, np.ndarray):
+                object.__setattr__(self, name, read_only(value))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Be copied and sent as the arguments that it is made of."""
+        given = {f.name: getattr(self, f.name) for f in fields(self) if f.init}
+        return _made, (type(self), given)
+
+
+def read_only(array: Any) -> Any:
+    """Return an array that cannot be written to, over the same numbers."""
+    view = array.view()
+    view.setflags(write=False)
+    return view
+
+
+def _made(kind: type[Frozen], arguments: dict[str, Any]) -> Frozen:
+    return kind(**arguments)
