@@ -175,7 +175,8 @@ def _shown(default: Any) -> str:
 
 
 def _codes() -> str:
-    from rrth_planner.ros.messages.error_codes import ErrorCode, MEANINGS
+    from rrth_planner.model.status import ErrorCode
+    from rrth_planner.ros.messages.error_codes import MEANINGS
 
     return _table(
         ('code', 'number', 'when'),

@@ -21,6 +21,7 @@ from rrth_planner.cli.program import interrupt_on_signals, INTERRUPTED, say
 from rrth_planner.io.extras import require
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.errors import MessageError, OptionsError, RrthError
+from rrth_planner.model.status import ErrorCode
 from rrth_planner.ros.client.answer_parser import Answer, answer_from_text
 from rrth_planner.ros.client.planner_client import (
     NotInTimeError,
@@ -29,7 +30,6 @@ from rrth_planner.ros.client.planner_client import (
 )
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.body_writer import body_from_file
-from rrth_planner.ros.messages.error_codes import ErrorCode
 from rrth_planner.ros.messages.frames import Frames
 from rrth_planner.ros.messages.goal import goal_from_msg
 from visualization_msgs.msg import MarkerArray

@@ -5,6 +5,8 @@
 import reprlib
 from typing import Any
 
+from rrth_planner.model.status import ErrorCode
+
 # Longest name in messages and pictures [characters].
 LONGEST_NAME = 256
 
@@ -63,6 +65,15 @@ class NotInstalledError(RrthError):
 
 class MessageError(RrthError):
     """A message that is rejected."""
+
+
+class RequestError(RrthError):
+    """A request that ends without a motion, with the code of its answer."""
+
+    def __init__(self, code: ErrorCode, sentence: str) -> None:
+        """Keep the code beside the sentence."""
+        super().__init__(sentence)
+        self.code = code
 
 
 class RecordError(RrthError):

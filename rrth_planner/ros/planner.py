@@ -15,9 +15,10 @@ from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rrth_planner.model.errors import MessageError, RrthError
+from rrth_planner.model.status import ErrorCode
 from rrth_planner.pipeline.worker_process import WorkerProcess
 from rrth_planner.ros.interface.parameters import declare_parameters, PlannerParameters
-from rrth_planner.ros.messages.error_codes import answer, code_of_rejection, ErrorCode
+from rrth_planner.ros.messages.error_codes import answer, code_of_rejection
 from rrth_planner.ros.middleware.answers import Answers
 from rrth_planner.ros.middleware.executor import settle_interpreter, spin
 from rrth_planner.ros.middleware.qos import SERVICE

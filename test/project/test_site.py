@@ -92,7 +92,8 @@ def test_the_site_has_the_parameters_of_each_node(node, tables):
 
 
 def test_the_site_has_the_error_codes(tables):
-    from rrth_planner.ros.messages.error_codes import ErrorCode, MEANINGS
+    from rrth_planner.model.status import ErrorCode
+    from rrth_planner.ros.messages.error_codes import MEANINGS
 
     expected = [(code.name, str(code.value)) for code in ErrorCode]
     assert tables('error_codes', 'error-codes', 2) == expected
@@ -231,7 +232,7 @@ def test_a_default_in_a_table_is_that_of_the_code():
 
 def test_pages_name_no_parameter_and_no_code_that_there_is_not():
     pytest.importorskip('rclpy')
-    from rrth_planner.ros.messages.error_codes import ErrorCode
+    from rrth_planner.model.status import ErrorCode
 
     known = {setting.name for declared in settings().values() for setting in declared}
     of_ros = {'use_sim_time', 'robot_description'}

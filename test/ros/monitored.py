@@ -80,6 +80,10 @@ class Monitored:
         self.begin()
         self.said.clear()
 
+    def know(self, **known):
+        """Let the monitor know this, too, by the names of `Watch`."""
+        self.monitor._watch = replace(self.monitor.watch, **known)
+
     def begin(self):
         """Let a motion begin."""
         running = ExecutingMotion(trajectory=self.motion, start_time=100.0)
@@ -122,7 +126,7 @@ class Monitored:
             self.now = 100.0 + PHASE + 0.01 * k
             self.read(*arm(0.01 * k))
             if k % 2 == 0:
-                self.monitor._on_timer()
+                self.monitor.check()
 
     def executes(self):
         """Return where an arm is, and how fast, that follows the last stop that was published."""

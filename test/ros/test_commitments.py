@@ -20,18 +20,19 @@ from rrth_planner.execution import commitments  # noqa: E402
 from rrth_planner.execution.body_motion import body_at  # noqa: E402
 from rrth_planner.execution.command import ahead, begin_of  # noqa: E402
 from rrth_planner.execution.commitment import extended  # noqa: E402
+from rrth_planner.execution.decide import IN_THE_WAY  # noqa: E402
 from rrth_planner.execution.executing_motion import ExecutingMotion, MAX_DEVIATION  # noqa: E402
 from rrth_planner.execution.separation_status import SeparationState  # noqa: E402
 from rrth_planner.execution.tracked_motion import forget_command  # noqa: E402
+from rrth_planner.execution.watch import MonitorState, MOST_IGNORED  # noqa: E402
+from rrth_planner.model.errors import RequestError  # noqa: E402
 from rrth_planner.model.scene import Box, Scene  # noqa: E402
+from rrth_planner.model.status import ErrorCode  # noqa: E402
 from rrth_planner.model.trajectory import sample, Trajectory  # noqa: E402
-from rrth_planner.ros.interface.inputs import RequestError  # noqa: E402
 from rrth_planner.ros.interface.parameters import declare_parameters  # noqa: E402
 from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
-from rrth_planner.ros.messages.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.messages.marker_edits import BodyPart  # noqa: E402
 from rrth_planner.ros.monitor import execution_monitor  # noqa: E402
-from rrth_planner.ros.monitor.execution_monitor import MonitorState, MOST_IGNORED  # noqa: E402
 import worlds  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
@@ -59,7 +60,7 @@ class Separated(Monitored):
         """Let the motion begin now, from its first point."""
         self.now += 1.0
         # The arm is put to the first point: what it was commanded is over.
-        self.monitor._tracked = forget_command(self.monitor._tracked)
+        self.know(tracked=forget_command(self.monitor.watch.tracked))
         self.motion = SWING
         self.published.clear()
         self.read(*self.on_time(0.0))
@@ -78,7 +79,7 @@ class Separated(Monitored):
             self.read(*self.commanded(self.now)[:2])
             if sees:
                 self.see(*(boxes or (FAR,)))
-            self.monitor._on_timer()
+            self.monitor.check()
 
     def see(self, *boxes, expires=float('inf')):
         """Let a body come that was measured 20 ms ago."""
@@ -190,7 +191,7 @@ def test_beside_a_wearer_each_commitment_continues_the_last_one_and_is_separate(
             ):
                 assert np.abs(now - then).max() <= same
             settings = arm.reporter.parameters.separation
-            body = body_at(arm.monitor._commitments.body, begin, settings.rules)
+            body = body_at(arm.monitor.watch.commitments.body, begin, settings.rules)
             found = separation_violations(
                 ARM, body, trajectory, settings.rules, settings.margin, period=5e-3
             )
@@ -267,7 +268,7 @@ def frames_until_given_up(arm, place, hand):
         arm.now += FRAME
         arm.read(place, np.zeros(4))
         arm.see(hand)
-        arm.monitor._on_timer()
+        arm.monitor.check()
         n += 1
         assert n * FRAME < 2.0
     return n
@@ -289,14 +290,14 @@ def test_a_motion_that_its_controller_rejects_is_given_up_where_the_arm_rests(
     for _ in range(MOST_IGNORED - 1):
         assert arm.monitor.take_stops()[-1].is_replanned
         assert 'does not follow it' in arm.monitor.stop_reason
-        assert arm.monitor._state is MonitorState.IDLE
+        assert arm.monitor.watch.state is MonitorState.IDLE
         arm.begin()
         if has_moved:
             arm.frames(30, hand)
         frames_until_given_up(arm, arm.commanded(arm.now)[0], hand)
     # One that never moves is not asked for ever.
     assert arm.monitor.take_stops()[-1].is_replanned == has_moved
-    assert arm.monitor._state is (MonitorState.IDLE if has_moved else MonitorState.HOLDING)
+    assert arm.monitor.watch.state is (MonitorState.IDLE if has_moved else MonitorState.HOLDING)
     arm.begin()
     assert arm.monitor.running is not None
 
@@ -311,7 +312,7 @@ def test_a_late_arm_whose_driver_has_no_velocities_is_followed(separated, hand):
         arm.now += FRAME
         arm.read(arm.commanded(max(begin, arm.now - 0.03))[0], np.zeros(4))
         arm.see(hand)
-        arm.monitor._on_timer()
+        arm.monitor.check()
         assert arm.monitor.running is not None
     assert np.abs(arm.commanded(arm.now)[0] - arm.motion.positions[-1]).max() < 1e-6
 
@@ -329,7 +330,7 @@ def test_an_arm_that_sags_or_rests_where_it_is_commanded_is_followed(separated):
         if k < 60 or k > 78:
             # In between no body comes, and the arm stops on its way.
             arm.see(hand)
-        arm.monitor._on_timer()
+        arm.monitor.check()
         if k > 120 and arm.is_over:
             break
     assert not arm.monitor.take_stops()
@@ -395,7 +396,7 @@ def test_a_stop_that_is_not_proven_leaves_the_arm_on_its_commitment_while_that_i
     n = len(arm.published)
     arm.monitor.fail('of the test')
     assert len(arm.published) == n + (not is_kept)
-    assert arm.monitor._state is MonitorState.STOPPING
+    assert arm.monitor.watch.state is MonitorState.STOPPING
     arm.frames(60, hand)
     assert len(arm.published) == n + (not is_kept)
     assert arm.is_over
@@ -434,7 +435,7 @@ def test_a_stop_that_the_arm_missed_comes_again_though_not_proven_where_nothing_
         arm.now += FRAME
         arm.read(*(row[0] for row in sample(kept, [arm.now - begin])[:2]))
         arm.see(FAR)
-        arm.monitor._on_timer()
+        arm.monitor.check()
     assert len(arm.published) >= 3
 
 
@@ -446,8 +447,8 @@ def test_an_arm_that_is_late_by_what_is_stated_is_not_taken_to_ignore_its_motion
         # It rests for 0.45 s, and then executes all of it.
         arm.read(*arm.commanded(max(arm.now - 0.45, arm.published[0][1]))[:2])
         arm.see(FAR)
-        arm.monitor._on_timer()
-        assert arm.monitor._state is MonitorState.MONITORING
+        arm.monitor.check()
+        assert arm.monitor.watch.state is MonitorState.MONITORING
     assert not arm.monitor.stop_reason
 
 
@@ -475,7 +476,7 @@ def test_a_motion_from_rest_begins_with_the_last_instants_of_what_is_commanded(s
 
 def test_an_arm_that_begins_the_whole_rest_late_is_stopped_when_it_is_given_up(separated):
     arm = separated()
-    assert arm.monitor._commitments.is_whole
+    assert arm.monitor.watch.commitments.is_whole
     frames_until_given_up(arm, SWING.positions[0], FAR)
     assert len(arm.published) == 2
     stop = arm.published[-1][0]
@@ -489,34 +490,34 @@ def test_the_whole_rest_that_an_arm_still_executes_is_proven_again(separated):
     arm.period = 1 / 30
     arm.frames(5)
     kept, begin = arm.published[-1]
-    whole = arm.monitor._commitments.present
+    whole = arm.monitor.watch.commitments.present
     assert whole.is_whole
     arm.frames(1, FAR, hand)
-    assert arm.monitor._commitments.present is not whole
+    assert arm.monitor.watch.commitments.present is not whole
     arm.said.clear()
-    while arm.monitor._commitments.present is not whole:
+    while arm.monitor.watch.commitments.present is not whole:
         # The controller has rejected what came since, and goes on with the whole rest.
         assert 'stopped' not in arm.said
         arm.now += arm.period
         arm.read(*(row[0] for row in sample(kept, [arm.now - begin])[:2]))
         arm.see(FAR, hand)
-        arm.monitor._on_timer()
+        arm.monitor.check()
     assert 'stopped' in arm.said
 
 
 def test_the_whole_rest_is_remembered_however_often_it_was_replaced(separated):
     arm, hand = separated(), near(0.6)
     arm.frames(15)
-    kept = arm.monitor._commitments.present
+    kept = arm.monitor.watch.commitments.present
     assert kept.is_whole
     n = len(arm.published)
     arm.frames(2 * commitments.REMEMBERED, FAR, hand)
     assert len(arm.published) > n + commitments.REMEMBERED
-    recent = arm.monitor._commitments.recent
+    recent = arm.monitor.watch.commitments.recent
     # Two have not begun yet.
     assert len(recent) <= commitments.REMEMBERED + 3
     assert recent[0].commitment is kept
-    assert recent[-1].commitment is arm.monitor._commitments.present
+    assert recent[-1].commitment is arm.monitor.watch.commitments.present
 
 
 def test_a_report_that_fails_keeps_no_arm_from_being_stopped(separated):
@@ -529,7 +530,7 @@ def test_a_report_that_fails_keeps_no_arm_from_being_stopped(separated):
     arm.reporter.separation_status = fail
     arm.monitor.fail('an error', is_replanned=False)
     assert len(arm.published) == n + 1
-    assert arm.monitor._commitments.fault == 'an error'
+    assert arm.monitor.watch.commitments.fault == 'an error'
 
 
 def test_an_arm_off_its_motion_is_stopped_where_no_body_comes(separated):
@@ -539,7 +540,7 @@ def test_an_arm_off_its_motion_is_stopped_where_no_body_comes(separated):
     for _ in range(40):
         arm.now += FRAME
         arm.read(arm.commanded(arm.now)[0] + 0.5, np.ones(4))
-        arm.monitor._on_timer()
+        arm.monitor.check()
     assert 'body_timeout' in arm.monitor.stop_reason
     assert len(arm.published) == n + 1
 
@@ -687,11 +688,11 @@ def test_where_the_controller_rejects_a_handover_the_motion_before_it_goes_on(se
     assert np.abs(end - arm.motion.positions[-1]).max() > 0.1
     n_kept = len(arm.published) - 1
     # Nothing that belongs to the new motion reaches the controller.
-    while len(arm.monitor._reporter.monitor_state[1]) == 0 and arm.now < begin + 2.0:
+    while len(arm.reporter.monitor_state[1]) == 0 and arm.now < begin + 2.0:
         arm.now += FRAME
         arm.read(*(row[0] for row in sample(kept, [arm.now - begin])[:2]))
         arm.see(hand)
-    assert 'monitoring the previous one' in arm.monitor._reporter.monitor_state[1]
+    assert 'monitoring the previous one' in arm.reporter.monitor_state[1]
     assert arm.now < begin + 0.3
     arm.published[:] = [*arm.published[:n_kept], *arm.published[-1:]]
     arm.frames(900, hand)
@@ -761,7 +762,7 @@ def test_a_part_that_is_faster_than_assumed_slows_the_arm_down(separated):
     jumps = [hand, replace(hand, center=hand.center + 0.08)]
     for k in range(20):
         arm.frames(1, jumps[k % 2])
-    assert arm.monitor._commitments.body.n_faster == 1
+    assert arm.monitor.watch.commitments.body.n_faster == 1
     assert arm.statuses[-1].state is not SeparationState.NORMAL
 
 
@@ -769,13 +770,13 @@ def test_a_part_that_is_faster_than_assumed_slows_the_arm_down(separated):
 def test_where_a_part_is_new_the_whole_rest_of_the_motion_is_taken_back(separated, clearance):
     arm, hand = separated(), near(clearance)
     arm.frames(20)
-    assert arm.monitor._commitments.is_whole
+    assert arm.monitor.watch.commitments.is_whole
     n = len(arm.published)
     arm.frames(1, FAR, hand)
     # By a slower motion that is proven, or by a stop.
     assert len(arm.published) == n + 1
     assert arm.statuses[-1].state is not SeparationState.NORMAL
-    assert 'stopped' in arm.said or not arm.monitor._commitments.is_whole
+    assert 'stopped' in arm.said or not arm.monitor.watch.commitments.is_whole
     arm.frames(900, FAR, hand)
     assert arm.is_over
 
@@ -793,10 +794,10 @@ def test_where_a_part_is_faster_than_assumed_the_whole_rest_is_taken_back(separa
     arm.see(hand)
     arm.begin()
     arm.frames(20, hand)
-    assert arm.monitor._commitments.is_whole
+    assert arm.monitor.watch.commitments.is_whole
     n = len(arm.published)
     arm.frames(1, replace(hand, center=hand.center - [0.08, 0.0, 0.0]))
-    assert arm.monitor._commitments.body.n_faster == 1
+    assert arm.monitor.watch.commitments.body.n_faster == 1
     assert len(arm.published) == n + 1
     assert arm.statuses[-1].state is not SeparationState.NORMAL
 
@@ -805,12 +806,12 @@ def test_where_commitments_take_longer_to_find_they_begin_later(separated):
     arm, hand, ahead = separated(), near(0.3), []
     arm.see(hand)
     for took in (0.0, 0.012):
-        arm.monitor._commitments = replace(arm.monitor._commitments, took=took)
+        arm.know(commitments=replace(arm.monitor.watch.commitments, took=took))
         arm.begin()
         found = []
         for _ in range(10):
             arm.frames(1, hand)
-            found.append(arm.monitor._commitments.present.start_time - arm.now)
+            found.append(arm.monitor.watch.commitments.present.start_time - arm.now)
         ahead.append(max(found))
     assert 0.008 < ahead[1] - ahead[0] < 0.02
 
@@ -820,7 +821,7 @@ def test_a_commitment_that_comes_when_a_sharp_stop_has_begun_is_not_published(
 ):
     arm, hand = beside(separated, 0.3, stop_acceleration=[10.0], stop_jerk=[400.0])
     # Less than what is too long in any case.
-    took = arm.monitor._commitments.present.stretch - FRAME - 0.001
+    took = arm.monitor.watch.commitments.present.stretch - FRAME - 0.001
     assert 0.0 < took < commitments.LATEST
 
     def slow(*arguments):
@@ -838,15 +839,15 @@ def test_a_commitment_that_comes_when_a_sharp_stop_has_begun_is_not_published(
 
 def test_of_bodies_that_came_together_all_are_seen_and_the_newest_is_checked(separated):
     arm, hand = beside(separated, 0.3, 5)
-    n, sights = len(arm.published), arm.monitor._commitments.body.n_seen
+    n, sights = len(arm.published), arm.monitor.watch.commitments.body.n_seen
     arm.now += FRAME
     arm.read(*arm.commanded(arm.now)[:2])
     part = BodyPart((replace(hand, center=hand.center + 0.08),), float('inf'), arm.now - 0.02)
     body = WearerBody(((('hand', 0), part),))
     arm.monitor.on_body(body, 0, is_newest=False)
     assert len(arm.published) == n
-    assert arm.monitor._commitments.body.n_seen == sights + 1
-    assert arm.monitor._commitments.body.n_faster == 1
+    assert arm.monitor.watch.commitments.body.n_seen == sights + 1
+    assert arm.monitor.watch.commitments.body.n_faster == 1
     arm.frames(1, hand)
     assert len(arm.published) > n
 
@@ -903,7 +904,7 @@ def test_a_hand_in_the_ray_further_on_stops_the_arm_only_where_it_stays(separate
     n = len(arm.published)
     arm.frames(60, hand, other)
     assert 'stopped' in arm.said
-    assert arm.monitor.stop_reason == execution_monitor.IN_THE_WAY
+    assert arm.monitor.stop_reason == IN_THE_WAY
     check_ray(arm, n, other)
     arm.frames(100, hand, other)
     assert not arm.commanded(arm.now)[1].any()
@@ -920,7 +921,7 @@ def test_a_hand_that_comes_into_the_ray_has_the_arm_slow_down_before(
     arm.begin()
     arm.frames(rate // 12, hand)
     # Without a wearer near the controller has the whole rest of the motion.
-    assert arm.monitor._commitments.is_whole == (clearance is None)
+    assert arm.monitor.watch.commitments.is_whole == (clearance is None)
     expected, way = Scene((in_the_ray(),)), []
     monkeypatch.setattr(arm.inputs, 'expected_scene', lambda: expected)
     for _ in range(4 * rate):
@@ -940,7 +941,7 @@ def test_where_the_controller_rejects_commitments_the_one_that_it_executes_is_co
         arm.now += FRAME
         arm.read(*(row[0] for row in sample(kept, [arm.now - begin])[:2]))
         arm.see(hand)
-        arm.monitor._on_timer()
+        arm.monitor.check()
     n = len(arm.published)
     last = arm.published[-1]
     arm.published[:] = [m for m in arm.published if m[1] <= begin] + [last]
@@ -966,7 +967,7 @@ def test_an_arm_that_rests_beside_its_commitment_goes_on_from_where_it_is(separa
         arm.now += FRAME
         arm.read(*(row[0] for row in sample(kept, [arm.now - begin])[:2]))
         arm.see(hand)
-        arm.monitor._on_timer()
+        arm.monitor.check()
     trajectory, start = arm.published[-1]
     assert start > begin + kept.duration
     assert np.abs(trajectory.positions[0] - kept.positions[-1]).max() < 1e-4

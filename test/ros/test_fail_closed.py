@@ -15,7 +15,12 @@ pytest.importorskip('fcl')
 from monitored import FAR, Monitored, without_separation  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 import rrth_planner  # noqa: E402
-from rrth_planner.execution import commitments, tracked_motion  # noqa: E402
+from rrth_planner.execution import (  # noqa: E402
+    commitments,
+    decide as guard,
+    fail_safe_stop,
+    tracked_motion,
+)
 from rrth_planner.execution.commitments import Commitments  # noqa: E402
 from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
@@ -115,7 +120,7 @@ def follow(arm):
         supervised(arm, lambda: arm.see(*arm.boxes))
         # A body that came while the one before was still checked has waited since then.
         arm.late = 0.0
-        supervised(arm, arm.monitor._on_timer)
+        supervised(arm, arm.monitor.check)
     return 'stopped' if arm.published and not arm.executes()[1].any() else 'continues'
 
 
@@ -128,9 +133,7 @@ def check(arm, which, kind, at):
 
     arm.late = 0.0
     with Injector(kind, at, delay) as injector:
-        supervised(
-            arm, (lambda: arm.see(*arm.boxes)) if which == 'body' else arm.monitor._on_timer
-        )
+        supervised(arm, (lambda: arm.see(*arm.boxes)) if which == 'body' else arm.monitor.check)
     arm.late = max(0.0, arm.late - PERIOD)
     return injector
 
@@ -155,20 +158,12 @@ def test_a_fault_at_any_call_of_the_monitor_stops_the_arm(monitored, kind, which
 
 def places():
     """Return what the monitor calls, as (owner, name)."""
-    names = 'scene_of is_remaining_free escapes_by_continuing stop_along arm_world'
     found = [
-        (execution_monitor, name)
-        for name, value in vars(execution_monitor).items()
-        if name in names.split()
-        or (isinstance(value, FunctionType) and value.__module__ == tracked_motion.__name__)
-    ]
-    found += [
-        (tracked_motion, name) for name in ('phase_of', 'sample', 'has_missed_stop', 'is_on_other')
-    ]
-    found += [
-        (commitments, name)
-        for name, value in vars(commitments).items()
-        if isinstance(value, FunctionType) and value.__module__ == commitments.__name__
+        (module, name)
+        for module in (execution_monitor, guard, fail_safe_stop, commitments, tracked_motion)
+        for name, value in vars(module).items()
+        if isinstance(value, FunctionType)
+        and value.__module__.startswith(('rrth_planner.execution', 'rrth_planner.ros.messages'))
     ]
     for owner in (
         Commitments,
@@ -247,7 +242,7 @@ def test_a_rejected_body_stops_the_arm_with_the_reason(monitored):
 def test_joint_positions_that_are_rejected_stop_the_arm(monitored):
     arm = monitored()
     arm.inputs.joint_rejection = MessageError('position: nan')
-    arm.monitor._on_timer()
+    arm.monitor.check()
     assert len(arm.published) == 1
     assert (
         'the last message on joints was rejected: position: nan' in arm.reporter.monitor_state[1]
@@ -273,7 +268,7 @@ def test_after_an_error_nothing_is_planned_by_itself(
     arm.reporter.parameters = replace(arm.reporter.parameters, replan=replan)
     arm.late = late
     if not late:
-        monkeypatch.setattr(execution_monitor, 'is_remaining_free', lambda *_, **__: 1 / 0)
+        monkeypatch.setattr(guard, 'is_remaining_free', lambda *_, **__: 1 / 0)
     arm.see(FAR)
     assert len(arm.published) == 1
     (stop,) = arm.monitor.take_stops()
@@ -289,7 +284,7 @@ def test_a_motion_that_is_not_wanted_any_more_is_not_planned_again_for_what_fail
         broken.setattr(arm.monitor._publishers, 'publish_motion', lambda *_: 1 / 0)
         arm.monitor.brake('of the test')
         arm.monitor.fail('a body is late')
-    arm.monitor._on_timer()
+    arm.monitor.check()
     assert len(arm.published) == 1
     (stop,) = arm.monitor.take_stops()
     assert not stop.is_replanned

@@ -19,16 +19,19 @@ from rcl_interfaces.msg import Log  # noqa: E402
 from rrth_planner.cli import replay  # noqa: E402
 from rrth_planner.collision import trajectory_validation  # noqa: E402
 from rrth_planner.collision.violation import Violation  # noqa: E402
+from rrth_planner.execution.watch import Stop  # noqa: E402
 from rrth_planner.io.incident import IncidentKind  # noqa: E402
 from rrth_planner.io.incident_file import read_incident  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
-from rrth_planner.model.status import PlanStatus  # noqa: E402
+from rrth_planner.model.status import (
+    ErrorCode,  # noqa: E402
+    PlanStatus,  # noqa: E402
+)
 from rrth_planner.planning.options import RRTStarOptions  # noqa: E402
 from rrth_planner.ros.interface import reporter  # noqa: E402
 from rrth_planner.ros.interface.inputs import Inputs  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of, WearerBody  # noqa: E402
-from rrth_planner.ros.messages.error_codes import CODE_OF_STATUS, ErrorCode  # noqa: E402
-from rrth_planner.ros.monitor.execution_monitor import Stop  # noqa: E402
+from rrth_planner.ros.messages.error_codes import CODE_OF_STATUS  # noqa: E402
 from rrth_planner.ros.requests import incidents, plan_request  # noqa: E402
 from rrth_planner.timing.fast_stop import fast_stop  # noqa: E402
 import samples  # noqa: E402

@@ -16,15 +16,16 @@ from monitored import ARM, FAR, Monitored, PHASE, without_separation  # noqa: E4
 from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rrth_planner.collision import reference_checker  # noqa: E402
+from rrth_planner.execution.decide import SOON_IN_THE_WAY  # noqa: E402
 from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
+from rrth_planner.execution.watch import MonitorState  # noqa: E402
 from rrth_planner.model.scene import Box, Scene  # noqa: E402
 from rrth_planner.model.trajectory import MotionLimits, sample, Trajectory  # noqa: E402
 from rrth_planner.ros.interface import inputs as inputs_module  # noqa: E402
 from rrth_planner.ros.interface.inputs import Inputs  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of, WearerBody  # noqa: E402
 from rrth_planner.ros.messages.marker_edits import BodyPart  # noqa: E402
-from rrth_planner.ros.monitor import execution_monitor  # noqa: E402
-from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor, MonitorState  # noqa: E402
+from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
 
@@ -93,7 +94,7 @@ def test_an_arm_stops_for_a_part_that_is_about_to_move_into_its_way(monitored, a
     # Further on there is time enough.
     assert monitored.said == (['free'] if ahead > 0.5 else ['stopped'])
     if ahead < 0.5:
-        assert monitored.monitor.stop_reason == execution_monitor.SOON_IN_THE_WAY
+        assert monitored.monitor.stop_reason == SOON_IN_THE_WAY
         # It is proven free of the wearer as he is.
         (stop,) = monitored.monitor.take_stops()
         assert stop.scene is not None
@@ -201,7 +202,7 @@ def test_every_arm_is_stopped(monitored, arm, late):
 
 def test_the_monitor_checks_while_simulated_time_stands_still(spinning, wait_until, monkeypatch):
     looks = []
-    monkeypatch.setattr(ExecutionMonitor, '_on_timer', lambda _: looks.append(0))
+    monkeypatch.setattr(ExecutionMonitor, 'check', lambda _: looks.append(0))
     node = Node('paused', parameter_overrides=[Parameter('use_sim_time', value=True)])
     Monitored(node)
     with spinning(node):
@@ -318,7 +319,7 @@ def test_an_arm_that_begins_its_motion_late_is_monitored_on_that_again(monitored
     assert 'ignored the last commanded motion' in monitored.reporter.monitor_state[1]
     monitored.now += 0.02
     monitored.read(*(row[0] for row in sample(turned, [0.8])[:2]))
-    monitored.monitor._on_timer()
+    monitored.monitor.check()
     assert 'follows the last commanded motion again' in monitored.reporter.monitor_state[1]
     monitored.see(monitored.hand(0.95, 0.0, turned))
     assert len(monitored.published) == 1
@@ -333,7 +334,7 @@ def test_an_arm_that_took_neither_its_motion_nor_the_stop_of_it_is_stopped_on_it
     for k in range(1, 31):
         monitored.now = begin + 0.01 * k
         monitored.read(*arms[False](monitored.now - 100.0 - PHASE))
-        monitored.monitor._on_timer()
+        monitored.monitor.check()
     stop, at = monitored.published[1]
     assert np.allclose(stop.positions[0], arms[False](at - 100.0 - PHASE)[0], atol=1e-3)
 
@@ -360,12 +361,12 @@ def test_a_stale_input_stops_the_arm(monitored, setting, why, arm):
     monitored.reporter.parameters = replace(monitored.reporter.parameters, **setting)
     monitored.see(FAR, expires=monitored.now + (0.1 if why == 'lost' else 10.0))
     monitored.read(*ARMS[arm](*monitored.on_time(PHASE)))
-    monitored.monitor._on_timer()
+    monitored.monitor.check()
     assert monitored.published == []
     monitored.now += 0.3
     if why != 'joint_timeout':
         monitored.read(*ARMS[arm](*monitored.on_time(PHASE + 0.3)))
-    monitored.monitor._on_timer()
+    monitored.monitor.check()
     assert len(monitored.published) == 1
     assert why in monitored.reporter.monitor_state[1]
 
@@ -385,7 +386,7 @@ def test_a_lost_part_stays_where_it_was_until_the_arm_stops(monitored):
         assert monitored.published == []
     monitored.now += 0.2
     monitored.read(*monitored.on_time(PHASE + 0.6))
-    monitored.monitor._on_timer()
+    monitored.monitor.check()
     assert len(monitored.published) == 1
     assert 'has lost parts: "pack"' in monitored.reporter.monitor_state[1]
 
@@ -425,7 +426,7 @@ def test_a_stop_that_is_executed_is_published_once(monitored, late, beside):
 
     monitored.run(1.5, executes)
     assert len(monitored.published) == 1
-    assert monitored.monitor._state is MonitorState.HOLDING
+    assert monitored.monitor.watch.state is MonitorState.HOLDING
 
 
 def test_a_missed_stop_is_published_again(monitored):
@@ -466,11 +467,11 @@ def test_it_plans_again_for_the_same_goal_only_where_it_may(monitored, replan):
 
 def test_the_outcome_of_an_older_motion_does_not_end_monitoring_of_a_newer_one(monitored, capfd):
     monitored.monitor.report_hold('no way to the goal before')
-    assert monitored.monitor._state is MonitorState.MONITORING
+    assert monitored.monitor.watch.state is MonitorState.MONITORING
     monitored.see(monitored.hand(0.6, 0.0))
     assert len(monitored.published) == 1
     monitored.monitor.report_hold('no way to the goal')
-    assert monitored.monitor._state is MonitorState.HOLDING
+    assert monitored.monitor.watch.state is MonitorState.HOLDING
     said = 'arm holds its position: no way to the goal'
     assert monitored.reporter.monitor_state == ('holding', said)
     assert said in capfd.readouterr().err

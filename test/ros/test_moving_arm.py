@@ -19,11 +19,11 @@ from rrth_planner.execution.command import ahead  # noqa: E402
 from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
 from rrth_planner.execution.joint_reading import JointReading  # noqa: E402
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
+from rrth_planner.model.status import ErrorCode  # noqa: E402
 from rrth_planner.model.trajectory import REST_SPEED, sample, Trajectory  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
 from rrth_planner.ros.interface.inputs import Input, Inputs, InputSnapshot  # noqa: E402
 from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
-from rrth_planner.ros.messages.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.messages.marker_edits import BodyPart  # noqa: E402
 from rrth_planner.ros.requests import handover  # noqa: E402
 from rrth_planner.ros.requests.handover import EARLY, LEADS  # noqa: E402

@@ -35,6 +35,7 @@ from rclpy.task import Future  # noqa: E402
 from rrth_planner.collision import reference_checker, trajectory_validation  # noqa: E402
 from rrth_planner.collision.violation import Violation  # noqa: E402
 from rrth_planner.execution.command import ahead, BEFORE  # noqa: E402
+from rrth_planner.execution.watch import Stop  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.io.incident_file import read_incident  # noqa: E402
 from rrth_planner.model.arm import (  # noqa: E402
@@ -43,6 +44,7 @@ from rrth_planner.model.arm import (  # noqa: E402
     tool_pose,
 )
 from rrth_planner.model.scene import Box, Scene  # noqa: E402
+from rrth_planner.model.status import ErrorCode  # noqa: E402
 from rrth_planner.model.trajectory import positions_at, Trajectory  # noqa: E402
 from rrth_planner.pipeline import in_process_planner  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
@@ -52,13 +54,11 @@ from rrth_planner.ros.client import planner_client  # noqa: E402
 from rrth_planner.ros.interface.parameters import RULES  # noqa: E402
 from rrth_planner.ros.interface.reporter import PlanReport  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of  # noqa: E402
-from rrth_planner.ros.messages.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.messages.fields import seconds_of  # noqa: E402
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg  # noqa: E402
 from rrth_planner.ros.middleware import executor_barrier  # noqa: E402
 from rrth_planner.ros.middleware.executor_barrier import ExecutorBarrier  # noqa: E402
 from rrth_planner.ros.monitor import execution_monitor  # noqa: E402
-from rrth_planner.ros.monitor.execution_monitor import Stop  # noqa: E402
 from rrth_planner.ros.planner import PlannerNode  # noqa: E402
 from rrth_planner.ros.requests import request_queue  # noqa: E402
 from rrth_planner.ros.requests.plan_request import PlanOutcome  # noqa: E402
@@ -872,7 +872,8 @@ def stop_for(planner, scene=None):
     still = np.zeros((1, 4))
     over = Trajectory(times=[0.0], positions=[FOLDED], velocities=still, accelerations=still)
     monitor = planner._monitor
-    monitor._stops.append(Stop(over, goal, parameters, scene, True, monitor.n_motions))
+    stop = Stop(over, goal, parameters, scene, True, monitor.n_motions)
+    monitor._watch = replace(monitor.watch, stops=(*monitor.watch.stops, stop))
 
 
 def test_after_a_stop_it_plans_again_from_where_the_arm_has_come_to_rest(start, monkeypatch):

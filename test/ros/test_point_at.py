@@ -31,6 +31,7 @@ from rrth_planner.io.resources import resource_path  # noqa: E402
 from rrth_planner.io.wearer_file import load_body  # noqa: E402
 from rrth_planner.model.arm import pointing_error  # noqa: E402
 from rrth_planner.model.errors import MessageError, RrthError  # noqa: E402
+from rrth_planner.model.status import ErrorCode  # noqa: E402
 from rrth_planner.model.trajectory import Trajectory  # noqa: E402
 from rrth_planner.ros.client import dry_run  # noqa: E402
 from rrth_planner.ros.client.answer_parser import Answer, answer_from_text  # noqa: E402
@@ -38,7 +39,6 @@ from rrth_planner.ros.client.follow_motion import announced_motion, follow  # no
 from rrth_planner.ros.client.planner_client import NotInTimeError, PlannerClient  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.body_writer import body_from_file, body_to_msg  # noqa: E402
-from rrth_planner.ros.messages.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.messages.trajectory import joint_trajectory_to_msg
 from rrth_planner.ros.middleware.child_process import ChildProcess  # noqa: E402
 from rrth_planner.ros.middleware.open_subscription import Arrival  # noqa: E402

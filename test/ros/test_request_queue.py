@@ -14,13 +14,13 @@ from monitored import ARM, FAR, without_separation  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rrth_planner.execution.joint_reading import JointReading  # noqa: E402
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
+from rrth_planner.model.status import ErrorCode  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
 from rrth_planner.ros.interface.inputs import Inputs  # noqa: E402
 from rrth_planner.ros.interface.parameters import NEVER  # noqa: E402
 from rrth_planner.ros.interface.publishers import PlanPublishers  # noqa: E402
 from rrth_planner.ros.interface.reporter import Reporter  # noqa: E402
 from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
-from rrth_planner.ros.messages.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.messages.marker_edits import BodyPart  # noqa: E402
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor  # noqa: E402
 from rrth_planner.ros.requests.request_queue import MOST_WAITING, PlanQueue  # noqa: E402

@@ -199,7 +199,7 @@ class Wire:
         # The arm has executed nothing: what it was commanded before does not count.
         monitor = self.planner._monitor
         with monitor._lock:
-            monitor._tracked = forget_command(monitor._tracked)
+            monitor.watch.tracked = forget_command(monitor.watch.tracked)
         good = {'body': wearer(), 'target': target(), 'joints': joints()}
         return all(self.say(name, msg) for name, msg in good.items()) and self.plan().success
 

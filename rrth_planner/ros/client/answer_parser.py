@@ -6,7 +6,7 @@ import re
 from typing import NamedTuple
 
 from rrth_planner.model.errors import MessageError, one_line, shown
-from rrth_planner.ros.messages.error_codes import ErrorCode
+from rrth_planner.model.status import ErrorCode
 
 ANSWER = re.compile(r'([A-Z_]+) \((-?\d+)\): (.*)')
 NUMBER = r'(-?[0-9.]+(?:e[-+]?\d+)?)'

@@ -5,6 +5,7 @@
 from geometry_msgs.msg import PointStamped
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.errors import MessageError
+from rrth_planner.model.status import ErrorCode
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner
 from rrth_planner.ros.client.answer_parser import Answer, answer_from_text
 from rrth_planner.ros.client.planner_client import PlannerClient
@@ -12,7 +13,7 @@ from rrth_planner.ros.interface.inputs import Inputs
 from rrth_planner.ros.interface.parameters import in_effect, PlannerParameters
 from rrth_planner.ros.interface.scene_monitor import SceneMonitor
 from rrth_planner.ros.messages.body import WearerBody
-from rrth_planner.ros.messages.error_codes import answer, code_of_rejection, ErrorCode
+from rrth_planner.ros.messages.error_codes import answer, code_of_rejection
 from rrth_planner.ros.requests.plan_request import plan_request
 from visualization_msgs.msg import MarkerArray
 

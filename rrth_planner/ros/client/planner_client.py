@@ -28,6 +28,7 @@ from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import MessageError, one_line, RrthError
+from rrth_planner.model.status import ErrorCode
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.ros.client.answer_parser import Answer, answer_from_text
 from rrth_planner.ros.interface.parameters import (
@@ -37,7 +38,6 @@ from rrth_planner.ros.interface.parameters import (
 )
 from rrth_planner.ros.interface.separation_status import separation_from_msg
 from rrth_planner.ros.messages.diagnostics import GIVEN_UP_KEY, REQUEST_KEY
-from rrth_planner.ros.messages.error_codes import ErrorCode
 from rrth_planner.ros.messages.joint_state import (
     configuration_from_msg,
     gaps_between,

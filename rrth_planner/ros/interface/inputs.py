@@ -19,14 +19,15 @@ from rrth_planner.execution.expected_wearer import expected_scene
 from rrth_planner.execution.joint_reading import JointReading
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
-from rrth_planner.model.errors import MessageError, RrthError
+from rrth_planner.model.errors import MessageError, RequestError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
+from rrth_planner.model.status import ErrorCode
 from rrth_planner.model.trajectory import REST_SPEED, StartState
 from rrth_planner.ros.interface.parameters import AUTO, PlannerParameters
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.body_source import BodySource
-from rrth_planner.ros.messages.error_codes import code_of_rejection, ErrorCode
+from rrth_planner.ros.messages.error_codes import code_of_rejection
 
 T = TypeVar('T')
 # A message measured further ahead of now than this came before the clock was set back: its age is
@@ -39,15 +40,6 @@ STEADY = 0.08
 
 # Why a body that was sent once is not taken as that of a wearer who stands still.
 STREAM_ENDED = ', since a stream of bodies, or one with a stamp, has come (separation: auto)'
-
-
-class RequestError(RrthError):
-    """A request that ends without a motion, with the code of its answer."""
-
-    def __init__(self, code: ErrorCode, sentence: str) -> None:
-        """Keep the code beside the sentence."""
-        super().__init__(sentence)
-        self.code = code
 
 
 class ArmHasMoved(RequestError):

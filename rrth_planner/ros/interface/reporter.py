@@ -15,13 +15,14 @@ from rrth_planner.execution.body_motion import body_at, BodyMotion, RAISED, SHAR
 from rrth_planner.execution.separation_status import SeparationState, SeparationStatus
 from rrth_planner.model.errors import one_line
 from rrth_planner.model.separation import governing_speed, SeparationRules
+from rrth_planner.model.status import ErrorCode
 from rrth_planner.ros.interface.figures import Figures
 from rrth_planner.ros.interface.inputs import Inputs
 from rrth_planner.ros.interface.parameters import in_effect, PlannerParameters
 from rrth_planner.ros.interface.separation_status import LEVELS, NO_PROMISE, separation_to_msg
 from rrth_planner.ros.messages.body import WearerBody
 from rrth_planner.ros.messages.diagnostics import GIVEN_UP_KEY, REQUEST_KEY, status_to_msg
-from rrth_planner.ros.messages.error_codes import answer, ErrorCode
+from rrth_planner.ros.messages.error_codes import answer
 from rrth_planner.ros.middleware.qos import LATCHED
 
 # Diagnostics are published at least this often [s].

@@ -2,32 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Error codes of answers: names and numbers of moveit_msgs/MoveItErrorCodes."""
 
-from enum import IntEnum
-
 from rrth_planner.model.errors import MessageError, one_line
-from rrth_planner.model.status import PlanStatus
+from rrth_planner.model.status import ErrorCode, PlanStatus
 from rrth_planner.ros.messages.frames import FrameError
-
-
-class ErrorCode(IntEnum):
-    """The codes that the planner answers with, spelt as MoveIt spells them."""
-
-    SUCCESS = 1
-    PLANNING_FAILED = -1
-    MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE = -3
-    UNABLE_TO_AQUIRE_SENSOR_DATA = -5
-    TIMED_OUT = -6
-    PREEMPTED = -7
-    START_STATE_IN_COLLISION = -10
-    GOAL_IN_COLLISION = -12
-    INVALID_GOAL_CONSTRAINTS = -16
-    FRAME_TRANSFORM_FAILURE = -21
-    ROBOT_STATE_STALE = -23
-    SENSOR_INFO_STALE = -24
-    START_STATE_INVALID = -26
-    NO_IK_SOLUTION = -31
-    FAILURE = 99999
-
 
 # When each is answered, and what the sentence behind it names.
 MEANINGS = {

@@ -5,16 +5,18 @@
 from pathlib import Path
 import shlex
 import traceback
+from typing import cast
 
 from rclpy.logging import get_logging_directory
 from rrth_planner.collision.violation import Disagreement
+from rrth_planner.execution.watch import Stop
 from rrth_planner.io.incident import disagreement_incident, error_incident, Incident
 from rrth_planner.io.incident_file import write_incident
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.pipeline.planning_process import Planner
 from rrth_planner.pipeline.request import PlanQuestion
-from rrth_planner.ros.monitor.execution_monitor import Stop
+from rrth_planner.ros.interface.parameters import PlannerParameters
 
 
 class PlanError(RrthError):
@@ -81,7 +83,7 @@ def incident_of_stop(stop: Stop, planner: Planner) -> Incident | None:
     """
     if stop.scene is None or stop.goal is None:
         return None
-    parameters, trajectory = stop.parameters, stop.trajectory
+    parameters, trajectory = cast(PlannerParameters, stop.parameters), stop.trajectory
     arm, margin, ray = parameters.arm, parameters.margin, parameters.ray_guard_length
     library = parameters.second_checker
     violation = planner.violation_seen(arm, stop.scene, trajectory, margin, ray, ray, 0.0, library)

@@ -5,12 +5,12 @@
 from dataclasses import replace
 
 import numpy as np
+from rrth_planner.model.errors import RequestError
 from rrth_planner.model.goal import PacedGoal, PointingGoal
+from rrth_planner.model.status import ErrorCode
 from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.request import PlanQuestion
-from rrth_planner.ros.interface.inputs import RequestError
-from rrth_planner.ros.messages.error_codes import ErrorCode
 
 # A motion is made so much longer than its least duration, so that the next plan is not shorter by
 # rounding [-]; the least duration is kept up to this [s].

@@ -12,15 +12,16 @@ from rrth_planner.execution.command import ahead
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.io.incident import disagreement_incident, Incident
 from rrth_planner.model.arrays import Array, FARTHEST
-from rrth_planner.model.errors import RrthError
+from rrth_planner.model.errors import RequestError, RrthError
 from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.status import ErrorCode
 from rrth_planner.model.trajectory import MotionState, sample, Trajectory
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.planning_process import Planner
 from rrth_planner.pipeline.request import PlanQuestion
-from rrth_planner.ros.interface.inputs import ArmHasMoved, Inputs, InputSnapshot, RequestError
+from rrth_planner.ros.interface.inputs import ArmHasMoved, Inputs, InputSnapshot
 from rrth_planner.ros.interface.parameters import PlannerParameters
-from rrth_planner.ros.messages.error_codes import CODE_OF_STATUS, ErrorCode
+from rrth_planner.ros.messages.error_codes import CODE_OF_STATUS
 from rrth_planner.ros.requests.handover import Handover, LATE, LEADS
 from rrth_planner.ros.requests.incidents import PlanError
 from rrth_planner.ros.requests.pace import (

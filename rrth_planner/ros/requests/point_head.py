@@ -17,10 +17,11 @@ from rrth_planner.io.settings import LOWEST_LIMIT
 from rrth_planner.model.arm import pointing_angle
 from rrth_planner.model.errors import MessageError
 from rrth_planner.model.goal import PacedGoal
+from rrth_planner.model.status import ErrorCode
 from rrth_planner.ros.interface.inputs import Inputs
 from rrth_planner.ros.interface.reporter import Reporter
 from rrth_planner.ros.interface.scene_monitor import SceneMonitor
-from rrth_planner.ros.messages.error_codes import code_of_rejection, ErrorCode
+from rrth_planner.ros.messages.error_codes import code_of_rejection
 from rrth_planner.ros.messages.paced_goal import paced_goal
 from rrth_planner.ros.messages.point_head import PointHead
 from rrth_planner.ros.middleware.answers import Answers

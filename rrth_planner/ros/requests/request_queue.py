@@ -10,6 +10,7 @@ from functools import partial
 import math
 import time
 import traceback
+from typing import cast
 
 from nav_msgs.msg import Path
 from rclpy.clock import Clock, ClockType
@@ -19,18 +20,21 @@ from rrth_planner.execution.command import ahead
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.joint_reading import JointReading
 from rrth_planner.execution.remaining_motion import is_place_free
+from rrth_planner.execution.watch import Stop
+from rrth_planner.model.errors import RequestError
 from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.status import ErrorCode
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.pipeline.planning_process import Planner
-from rrth_planner.ros.interface.inputs import Inputs, RequestError
+from rrth_planner.ros.interface.inputs import Inputs
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.interface.publishers import PlanPublishers
 from rrth_planner.ros.interface.reporter import PlanReport, Reporter
 from rrth_planner.ros.interface.separation_status import NO_PROMISE
 from rrth_planner.ros.messages.body import scene_of
-from rrth_planner.ros.messages.error_codes import answer, ErrorCode, FINAL
+from rrth_planner.ros.messages.error_codes import answer, FINAL
 from rrth_planner.ros.middleware.executor_barrier import ExecutorBarrier, NodeIsBusyError
-from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor, Stop
+from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor
 from rrth_planner.ros.requests.incidents import incident_of, incident_of_stop, keep, sentence_of
 from rrth_planner.ros.requests.plan_request import plan_request, PlanOutcome, require_not_cancelled
 from rrth_planner.ros.requests.revalidation import Revalidation
@@ -609,7 +613,7 @@ class PlanQueue:
         """Have the second checker check a stop that was published as proven free."""
         incident = incident_of_stop(stop, self._planner)
         if incident is not None:
-            noted, file = keep(incident, stop.parameters.incident_folder)
+            noted, file = keep(incident, cast(PlannerParameters, stop.parameters).incident_folder)
             self._reporter.incident(file)
             self._node.get_logger().error(f'fail-safe stop: {incident.sentence}{noted}')
 

@@ -11,19 +11,20 @@ from rrth_planner.collision.trajectory_validation import is_proven_free
 from rrth_planner.collision.violation import Disagreement
 from rrth_planner.collision.world import arm_world
 from rrth_planner.execution.command import ahead
+from rrth_planner.execution.decide import MARGIN_LEFT
 from rrth_planner.execution.executing_motion import ExecutingMotion, FOLLOWS
 from rrth_planner.execution.expected_wearer import is_expected_free
 from rrth_planner.execution.remaining_motion import is_place_free
 from rrth_planner.execution.tracked_motion import OFF_COMMAND
 from rrth_planner.model.arm import reach_to
+from rrth_planner.model.errors import RequestError
 from rrth_planner.model.scene import Scene
+from rrth_planner.model.status import ErrorCode
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.planning_process import Planner
-from rrth_planner.ros.interface.inputs import ArmHasMoved, Inputs, InputSnapshot, RequestError
+from rrth_planner.ros.interface.inputs import ArmHasMoved, Inputs, InputSnapshot
 from rrth_planner.ros.interface.parameters import PlannerParameters
-from rrth_planner.ros.messages.error_codes import ErrorCode
-from rrth_planner.ros.monitor.execution_monitor import MARGIN_LEFT
 from rrth_planner.ros.requests.handover import Handover, LEADS
 
 
