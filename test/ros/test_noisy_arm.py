@@ -80,18 +80,19 @@ class Encoders(Node):
 @pytest.mark.parametrize('separation', ['true', 'false'])
 def test_all_requests_begin_and_where_the_arm_is(separation, wait_until, send, spinning):
     with ExitStack() as stack:
-        client = Encoders()
+        client, said = Encoders(), []
         remapped = ['--ros-args', '-r', 'joint_states:=exact_states']
         values = f'separation:={separation}', 'body_timeout:=10.0', 'joint_timeout:=10.0'
         given = ['--ros-args', *(word for value in values for word in ('-p', value))]
         node = 'rrth_planner.ros.{}_node'.format
-        stack.enter_context(ChildProcess(node('playback'), remapped, lambda _: None))
-        stack.enter_context(ChildProcess(node('planner'), given, lambda _: None))
+        stack.enter_context(ChildProcess(node('playback'), remapped, said.append))
+        stack.enter_context(ChildProcess(node('planner'), given, said.append))
         stack.enter_context(spinning(client))
         wait_until(client.plan.service_is_ready, 120.0)
-        # Bodies come every 20 ms; the planner may find them later than its service is found.
+        # The planner may find bodies, joint states and the arm later than its service is found.
         wait_until(client.body.get_subscription_count)
-        time.sleep(0.5)
+        wait_until(lambda: client.count_subscribers('joint_trajectory') > 1)
+        time.sleep(2.0)
         targets, is_first = cycle(TARGETS), True
         for kind, n_requests in N_REQUESTS.items():
             client.encode = ENCODERS[kind]

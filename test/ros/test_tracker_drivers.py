@@ -284,7 +284,9 @@ def test_others_are_boxes_and_a_change_of_person_needs_a_reset():
         lost = [scene.show((2, aside)) for aside in (2.0, 1.0, 0.0)]
         assert set(scene.boxes((1, 0.0), (2, 1.0))) == {*parts, 'person 2'}
         assert not any(scene.answers(time) for time in lost)
-        assert any('expected person 1, who is the wearer' in line for line in scene.said)
+        # What a process writes comes by another way than what it publishes.
+        words = 'expected person 1, who is the wearer'
+        wait_until(lambda: any(words in line for line in scene.said))
         answer = scene.reset.call_async(Trigger.Request())
         wait_until(answer.done)
         assert answer.result().success

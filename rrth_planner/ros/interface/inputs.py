@@ -165,19 +165,19 @@ class InputSnapshot:
             known = joints.taken - running.start_time, 1.0
         elif running is not None and not self.is_moving(joints.taken):
             known = self._localize(running)
-        # Velocities that overflow match no motion.
-        with np.errstate(all='ignore'):
-            found = predict_start_state(
-                joints.positions,
-                joints.velocities,
-                None if running is None else running.trajectory,
-                time - joints.taken,
-                known,
-            )
-        if not np.isfinite(found.state.positions).all():
+        try:
+            # Velocities that overflow match no motion.
+            with np.errstate(all='ignore'):
+                return predict_start_state(
+                    joints.positions,
+                    joints.velocities,
+                    None if running is None else running.trajectory,
+                    time - joints.taken,
+                    known,
+                )
+        except RrthError as problem:
             expected = f'a finite position {time - joints.taken:.3f} s later'
-            raise _rejection(arm, joints.velocities, expected)
-        return found
+            raise _rejection(arm, joints.velocities, expected) from problem
 
     def _localize(self, running: ExecutingMotion) -> tuple[float, float] | None:
         """Return the time within a motion of an arm that hardly moves [s], and its rate."""
