@@ -33,6 +33,11 @@ def without_separation(node):
     return replace(separated, separation=None, body_timeout=0.0, joint_timeout=0.0)
 
 
+def know(monitor, **known):
+    """Let a monitor know this, too, by the names of `Watch`."""
+    monitor._watch = replace(monitor.watch, **known)
+
+
 class Monitored:
     """A monitor of a motion that runs, on a clock of its own, and what it publishes."""
 
@@ -79,10 +84,6 @@ class Monitored:
         self.read(*self.on_time(PHASE))
         self.begin()
         self.said.clear()
-
-    def know(self, **known):
-        """Let the monitor know this, too, by the names of `Watch`."""
-        self.monitor._watch = replace(self.monitor.watch, **known)
 
     def begin(self):
         """Let a motion begin."""

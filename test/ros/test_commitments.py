@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from monitored import ARM, FAR, Monitored  # noqa: E402
+from monitored import ARM, FAR, know, Monitored  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rrth_planner.collision import reference_checker, separation  # noqa: E402
@@ -60,7 +60,7 @@ class Separated(Monitored):
         """Let the motion begin now, from its first point."""
         self.now += 1.0
         # The arm is put to the first point: what it was commanded is over.
-        self.know(tracked=forget_command(self.monitor.watch.tracked))
+        know(self.monitor, tracked=forget_command(self.monitor.watch.tracked))
         self.motion = SWING
         self.published.clear()
         self.read(*self.on_time(0.0))
@@ -806,7 +806,7 @@ def test_where_commitments_take_longer_to_find_they_begin_later(separated):
     arm, hand, ahead = separated(), near(0.3), []
     arm.see(hand)
     for took in (0.0, 0.012):
-        arm.know(commitments=replace(arm.monitor.watch.commitments, took=took))
+        know(arm.monitor, commitments=replace(arm.monitor.watch.commitments, took=took))
         arm.begin()
         found = []
         for _ in range(10):

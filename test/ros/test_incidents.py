@@ -15,6 +15,7 @@ pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 
 from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
+from monitored import know  # noqa: E402
 from rcl_interfaces.msg import Log  # noqa: E402
 from rrth_planner.cli import replay  # noqa: E402
 from rrth_planner.collision import trajectory_validation  # noqa: E402
@@ -146,8 +147,9 @@ def test_a_stop_that_violates_for_the_second_checker_is_kept_to_be_replayed(
     scene, goal = scene_of(inputs_of(planner).body.value), inputs_of(planner).target.value
 
     def follow_up():
-        monitor._stops.append(Stop(stop, goal, parameters, scene, False, monitor.n_motions))
-        stranger.wait_until(lambda: not monitor._stops)
+        found = Stop(stop, goal, parameters, scene, False, monitor.n_motions)
+        know(monitor, stops=(found,))
+        stranger.wait_until(lambda: not monitor.watch.stops)
         # Whatever the node's thread is at.
         time.sleep(0.05)
         planner._queue._worker.submit(lambda: None).result(30.0)

@@ -464,7 +464,7 @@ def test_a_plan_keeps_to_the_parameters_of_its_begin(start, monkeypatch):
     # They monitor the motion, too.
     for seed, margin in ((5, 0.02), (6, 0.03)):
         assert stranger.answer().message.split('; ')[0].endswith(f'seed {seed}')
-        assert planner._monitor._parameters.margin == margin
+        assert planner._monitor.watch.rules.margin == margin
     assert jerks == [40.0, 30.0]
 
 

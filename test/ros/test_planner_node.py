@@ -20,6 +20,7 @@ pytest.importorskip('fcl')
 
 from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
 from geometry_msgs.msg import PointStamped  # noqa: E402
+from monitored import know  # noqa: E402
 from nav_msgs.msg import Path  # noqa: E402
 from nav_msgs.srv import GetPlan  # noqa: E402
 from rclpy.duration import Duration  # noqa: E402
@@ -873,7 +874,7 @@ def stop_for(planner, scene=None):
     over = Trajectory(times=[0.0], positions=[FOLDED], velocities=still, accelerations=still)
     monitor = planner._monitor
     stop = Stop(over, goal, parameters, scene, True, monitor.n_motions)
-    monitor._watch = replace(monitor.watch, stops=(*monitor.watch.stops, stop))
+    know(monitor, stops=(*monitor.watch.stops, stop))
 
 
 def test_after_a_stop_it_plans_again_from_where_the_arm_has_come_to_rest(start, monkeypatch):
@@ -931,7 +932,7 @@ def test_a_plan_from_before_a_stop_is_not_published(start, monkeypatch):
     plan_motion = in_process_planner.plan_question
 
     def plan_while_the_arm_is_stopped(*args, **kwargs):
-        planner._monitor.n_stops += 1
+        know(planner._monitor, n_stops=planner._monitor.n_stops + 1)
         return plan_motion(*args, **kwargs)
 
     with monkeypatch.context() as patch:
@@ -952,9 +953,9 @@ def test_a_request_from_before_an_error_moves_no_arm_after_it(start, monkeypatch
     def plan_while_the_monitor_fails(*args, **kwargs):
         if errors:
             # As `fail` of a motion in progress.
-            planner._monitor.n_stops += 1
-            planner._monitor.n_faults += 1
-            planner._monitor.stop_reason = errors.pop()
+            monitor = planner._monitor
+            known = {'n_stops': monitor.n_stops + 1, 'n_faults': monitor.n_faults + 1}
+            know(monitor, **known, stop_reason=errors.pop())
         return plan_motion(*args, **kwargs)
 
     with monkeypatch.context() as patch:
@@ -972,7 +973,7 @@ def test_after_a_stop_it_plans_for_nothing_once_another_motion_has_begun(start, 
     say_all(planner, stranger, joint_states=joints(velocity=[0.0, 0.3, 0.0, 0.0]))
     stop_for(planner)
     stranger.wait_until(lambda: planner._queue._open)
-    planner._monitor.n_motions += 1
+    know(planner._monitor, n_motions=planner._monitor.n_motions + 1)
     stranger.publishers['joint_states'].publish(joints())
     stranger.wait_until(lambda: not planner._queue._open)
     planner._queue._worker.submit(lambda: None).result(30.0)

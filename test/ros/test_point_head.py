@@ -101,7 +101,7 @@ class Client(Node):
 
     def reach(self, target):
         """Let the arm arrive at a target."""
-        assert self.status(self.start(self.goal(target))[1]) == SUCCEEDED
+        assert self.status(self.start(self.goal(target))[1]) == SUCCEEDED, self.said[-10:]
 
     def speed(self):
         """Return how fast the arm moved last [rad/s]."""
@@ -144,7 +144,10 @@ def _client(request, ros_context):
         wait_until(client.heads.server_is_ready, 120.0)
         wait_until(lambda: client.states)
         send(client, client.body, samples.wearer())
-        # The planner may find the arm's joint states later than this client does.
+        # The planner may find the arm later than this client does: for its motions, to which the
+        # arm subscribes twice, ...
+        client.wait_for_report('subscribers of motions', '3')
+        # ... and by its joint states.
         n_states = len(client.states)
         wait_until(lambda: len(client.states) > n_states + 100)
         yield client

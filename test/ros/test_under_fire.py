@@ -21,6 +21,7 @@ from geometry_msgs.msg import (  # noqa: E402
     Quaternion,
     Vector3,
 )
+from monitored import know  # noqa: E402
 from nav_msgs.srv import GetPlan  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
@@ -199,7 +200,7 @@ class Wire:
         # The arm has executed nothing: what it was commanded before does not count.
         monitor = self.planner._monitor
         with monitor._lock:
-            monitor.watch.tracked = forget_command(monitor.watch.tracked)
+            know(monitor, tracked=forget_command(monitor.watch.tracked))
         good = {'body': wearer(), 'target': target(), 'joints': joints()}
         return all(self.say(name, msg) for name, msg in good.items()) and self.plan().success
 

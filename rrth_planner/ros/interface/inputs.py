@@ -19,7 +19,7 @@ from rrth_planner.execution.expected_wearer import expected_scene
 from rrth_planner.execution.joint_reading import JointReading
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
-from rrth_planner.model.errors import MessageError, RequestError
+from rrth_planner.model.errors import MessageError, RequestError, RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.status import ErrorCode

@@ -272,6 +272,7 @@ class Reporter:
             'least clearance [m]': f'{report.clearance:.4f}',
             'boxes': body.n_boxes,
             'publishers of the body': self._n_publishers,
+            'subscribers of motions': self._node.count_subscribers('joint_trajectory'),
             'lost parts': body.lost_names(),
             'allowed contacts': '; '.join(map(': '.join, self.parameters.arm.allowed)),
             'monitor': monitor,
