@@ -26,15 +26,18 @@ Tick              no motion              monitoring,         stopping,          
                                          stopping,           no motion,
                                          no motion, holding  holding, monitoring
 NobodyListens     no motion              monitoring          stopping           holding
-Fail              no motion              stopping            stopping           holding
-ClockStepped      no motion              stopping            stopping           holding
+Fail              no motion              monitoring,         stopping           holding
+                                         stopping
+ClockStepped      no motion              monitoring,         stopping           holding
+                                         stopping
 Hold              no motion              monitoring          stopping           holding
 Reset             no motion              monitoring          stopping           holding
 Rest              holding                monitoring          holding            holding
 StopsTaken        no motion              monitoring          stopping           holding
 ================  =====================  ==================  =================  ================
 
-A stop that cannot be published leaves the monitor monitoring, with that stop pending.
+A motion that is over needs no stop. One that cannot be published leaves the monitor monitoring,
+with that stop pending.
 """
 
 from collections.abc import Callable

@@ -1,0 +1,221 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The table of what the monitor may be doing after each event, cell by cell."""
+
+from dataclasses import fields, is_dataclass, replace
+import re
+
+from guarded import (
+    at_later,
+    BEGIN,
+    begun,
+    body,
+    GOAL,
+    hand,
+    idle,
+    moment,
+    on,
+    Rules,
+    turn,
+)
+import numpy as np
+import pytest
+from rrth_planner.execution import decide as module, event as events
+from rrth_planner.execution.decide import decide
+from rrth_planner.execution.watch import MonitorState, PendingStop, Watch
+
+MOTION = turn()
+END = BEGIN + MOTION.duration
+# Long after the end of a motion; and within it [s].
+LATE, WITHIN = END + 2.0, BEGIN + 0.5
+ELSEWHERE = MOTION.positions[-1] + 0.3
+STALE = 'the last good message on joints is 1.000 s old'
+
+
+def table():
+    """Return the table of the docstring: {event: {state: set of states}}."""
+    lines = [line for line in module.__doc__.splitlines() if line.strip()]
+    rules = [k for k, line in enumerate(lines) if line.startswith('====')]
+    starts = [m.start() for m in re.finditer('=+', lines[rules[0]])]
+    spans = [slice(a, b) for a, b in zip(starts, [*starts[1:], None], strict=True)]
+    heads = [lines[rules[0] + 1][span].strip() for span in spans]
+    found, name = {}, ''
+    for line in lines[rules[1] + 1 : rules[2]]:
+        cells = [line[span].strip() for span in spans]
+        name = cells[0] or name
+        row = found.setdefault(name, {head: [] for head in heads[1:]})
+        for head, cell in zip(heads[1:], cells[1:], strict=True):
+            row[head] += [state.strip() for state in cell.split(',') if state.strip()]
+    return {name: {k: set(v) for k, v in row.items()} for name, row in found.items()}
+
+
+def monitoring():
+    """Return a watch of a motion, with the motion."""
+    return begun(idle(), MOTION, moment(BEGIN, MOTION.positions[0]))
+
+
+def stopping(is_replanned=True, now=WITHIN):
+    """Return a watch of a stop."""
+    watch, motion = monitoring()
+    fail = events.Fail(on(motion, now), 'of the test', is_replanned, not is_replanned)
+    found = decide(watch, fail)
+    return found.watch, found.command.motion
+
+
+def holding():
+    """Return a watch of an arm that stays where its stop ended."""
+    watch, stop = stopping(is_replanned=False)
+    return decide(watch, events.Tick(on(stop, LATE))).watch
+
+
+def stopped_but_on_the_motion_before():
+    """Return a watch of a stop of a second motion, and that the arm executes the first one."""
+    watch, first = monitoring()
+    second = replace(first, trajectory=MOTION, start_time=WITHIN)
+    away = replace(MOTION, positions=MOTION.positions[::-1])
+    tracked = replace(watch.tracked, motion=replace(second, trajectory=away), previous=first)
+    watch = replace(watch, tracked=tracked)
+    watch = decide(watch, events.Fail(on(first, WITHIN + 0.01), 'of the test', True, False)).watch
+    return watch, events.Tick(on(first, WITHIN + 0.3))
+
+
+WATCHES = {
+    'no motion': [(idle(), None)],
+    'monitoring': [monitoring()],
+    'stopping': [stopping(), stopping(is_replanned=False)],
+    'holding': [(holding(), None)],
+}
+
+
+def moments(motion, state):
+    """Return when something may happen: within a motion, with stale inputs, after it."""
+    if motion is None:
+        return [moment(LATE, MOTION.positions[-1])]
+    found = [on(motion, motion.start_time + 0.1), on(motion, LATE)]
+    if state == 'monitoring':
+        found += [on(motion, WITHIN, overdue=STALE), moment(LATE, ELSEWHERE)]
+    return found
+
+
+def happening(name, state):
+    """Return (watch, event) for each way in which an event may find a state."""
+    kind = getattr(events, name)
+    for watch, motion in WATCHES[state]:
+        for at in moments(motion, state):
+            near = hand(MOTION, at.now - BEGIN + 0.6) if at.now < END else hand(MOTION, 0.5)
+            words = {
+                'Begin': lambda at=at: (
+                    replace(monitoring()[1], start_time=at.now, trajectory=MOTION),
+                    GOAL,
+                    Rules(),
+                    None,
+                    None,
+                ),
+                'BodyCame': lambda at=at: (body(at).sight, body(at).look),
+                'BodyWaited': lambda: (0.08,),
+                'StopFor': lambda at=at, near=near: ('of the test', near, WITHIN, at.now),
+                'StopUnproven': lambda motion=motion, near=near: (
+                    motion or monitoring()[1],
+                    near,
+                ),
+                'CommitmentTook': lambda: (0.01,),
+                'Fail': lambda: ('of the test', False, True),
+                'ClockStepped': lambda: (0.5, 'the clock was set forward'),
+                'Hold': lambda at=at: (at.now + 1.0,),
+                'Rest': lambda: ('of the test',),
+            }.get(name, lambda: ())()
+            if name == 'StopFor':
+                phases = (0.5, MOTION.duration)
+                events_ = [kind(at, words[0], words[1], phase, words[3]) for phase in phases]
+            else:
+                events_ = [kind(at, *words)]
+            for event in events_:
+                yield watch, event
+    if name == 'Tick' and state == 'stopping':
+        yield stopped_but_on_the_motion_before()
+    if name == 'BodyWaited' and state == 'monitoring':
+        watch, motion = monitoring()
+        known = replace(watch.commitments, sent=object())
+        yield replace(watch, commitments=known), kind(on(motion, WITHIN), 0.08)
+
+
+CELLS = [(name, state) for name, row in table().items() for state in row]
+
+
+def test_the_table_has_all_events_and_states():
+    kinds = {kind.__name__ for kind in events.Event.__subclasses__()}
+    assert set(table()) == kinds
+    assert all(set(row) == {s.value for s in MonitorState} for row in table().values())
+
+
+@pytest.mark.parametrize(('name', 'state'), CELLS)
+def test_a_cell_of_the_table_is_what_happens(name, state):
+    found = set()
+    for watch, event in happening(name, state):
+        assert watch.state.value == state
+        before = repr_of(watch)
+        decision = decide(watch, event)
+        # The former watch counts where nothing is published.
+        assert repr_of(watch) == before
+        found.add(decision.watch.state.value)
+        is_moving = decision.command is not None and name not in ('Begin', 'BodyCame')
+        if is_moving:
+            motion = decision.command.motion.trajectory
+            assert not motion.velocities[-1].any()
+    assert found == table()[name][state]
+
+
+def repr_of(watch):
+    """Return what a watch holds, by identity and value."""
+    return {field.name: getattr(watch, field.name) for field in fields(watch)}
+
+
+def test_a_stop_that_is_not_published_stays_pending_and_is_commanded_again():
+    watch, motion = monitoring()
+    found = decide(watch, events.Fail(on(motion, WITHIN), 'of the test', True, False))
+    assert found.watch.pending is None
+    kept = found.otherwise.watch
+    assert kept.pending == PendingStop('of the test', WITHIN, True)
+    assert kept.state is MonitorState.MONITORING
+    again = decide(kept, events.Tick(on(motion, WITHIN + 0.02)))
+    assert again.is_stop
+    assert again.watch.state is MonitorState.STOPPING
+    assert not again.command.motion.trajectory.velocities[-1].any()
+
+
+def test_a_wearer_in_the_way_stops_the_arm_by_an_event_with_a_time_of_its_own():
+    watch, motion = monitoring()
+    at = on(motion, WITHIN)
+    found = decide(watch, body(at, hand(MOTION, 1.1)))
+    assert found.command is None
+    stop = decide(found.watch, at_later(found.next, WITHIN + 0.004))
+    assert stop.is_stop
+    # It begins with what is commanded when it is published, not when the body came.
+    assert stop.command.motion.start_time <= WITHIN + 0.004
+    q = stop.command.motion.trajectory.positions[0]
+    phase = stop.command.motion.start_time - motion.start_time
+    assert np.abs(q - on(motion, BEGIN + phase).reading.positions).max() < 1e-6
+
+
+@pytest.mark.parametrize('name', sorted(table()))
+def test_the_same_watch_and_event_give_the_same_decision(name):
+    for state in WATCHES:
+        for watch, event in happening(name, state):
+            one, other = decide(watch, event), decide(watch, event)
+            assert one.watch.state is other.watch.state
+            assert one.lines == other.lines
+            if one.command is not None:
+                for first, second in zip(
+                    one.command.motion.trajectory.states,
+                    other.command.motion.trajectory.states,
+                    strict=True,
+                ):
+                    assert (first == second).all()
+                assert one.command.begin == other.command.begin
+
+
+def test_all_that_the_guard_knows_and_hears_is_frozen():
+    kinds = [Watch, events.Moment, *events.Event.__subclasses__(), events.Sight, events.Look]
+    for kind in kinds:
+        assert is_dataclass(kind)
+        assert kind.__dataclass_params__.frozen
