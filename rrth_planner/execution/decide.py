@@ -52,7 +52,7 @@ from rrth_planner.execution import commitments as given, event as events, fail_s
 from rrth_planner.execution.command import begin_of, continues, lead_in, led, rest_at
 from rrth_planner.execution.decision import Command, Decision, followed_by, Line
 from rrth_planner.execution.event import Event, Look, Moment
-from rrth_planner.execution.executing_motion import ExecutingMotion, MAX_DEVIATION
+from rrth_planner.execution.executing_motion import ExecutingMotion, is_same, MAX_DEVIATION
 from rrth_planner.execution.expected_wearer import is_expected_free
 from rrth_planner.execution.fail_safe_stop import holds, stop_of
 from rrth_planner.execution.remaining_motion import (
@@ -146,7 +146,8 @@ def _begun(watch: Watch, event: events.Begin) -> Decision:
             f'{watch.unsettled_by} less than {SETTLING:g} s ago: the ages of body and joints are '
             'not known yet',
         )
-    if event.planned_from is not None and event.planned_from is not watch.tracked.command:
+    before, command = event.planned_from, watch.tracked.command
+    if before is not None and (command is None or not is_same(before, command)):
         raise RequestError(
             INVALIDATED, 'the arm was commanded something else while its motion was planned'
         )

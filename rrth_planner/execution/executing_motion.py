@@ -167,6 +167,16 @@ class ExecutingMotion:
         return float(np.abs(positions_at(self.trajectory, [at])[0] - q).max())
 
 
+def is_same(motion: ExecutingMotion, other: ExecutingMotion) -> bool:
+    """Return whether two motions are the same at the same times."""
+    one, two = motion.trajectory, other.trajectory
+    return motion is other or (
+        motion.start_time == other.start_time
+        and np.array_equal(one.times, two.times)
+        and all(map(np.array_equal, one.states, two.states))
+    )
+
+
 def predict_start_state(
     positions: Array,
     velocities: Array,

@@ -84,6 +84,47 @@ class MonitorRules(Protocol):
         """Whether a stopped motion is planned again."""
 
 
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PlainRules:
+    """The rules by themselves, without a node."""
+
+    arm: ArmModel
+    margin: float
+    ray_guard_length: float
+    stop_limits: MotionLimits
+    execution: ExecutionRules
+    stands_still: bool = False
+    replan: bool = True
+
+    @property
+    def controller_delay(self) -> float:
+        """The greatest one [s]."""
+        return self.execution.controller_delay
+
+    @property
+    def rest_speed(self) -> float:
+        """The arm rests where no joint is faster [rad/s]."""
+        return self.execution.rest_speed
+
+    @property
+    def separation(self) -> Separation | None:
+        """What commitments are proven with."""
+        return self.execution.separation
+
+
+def plain(rules: MonitorRules) -> PlainRules:
+    """Return rules by themselves."""
+    return PlainRules(
+        arm=rules.arm,
+        margin=rules.margin,
+        ray_guard_length=rules.ray_guard_length,
+        stop_limits=rules.stop_limits,
+        execution=rules.execution,
+        stands_still=rules.stands_still,
+        replan=rules.replan,
+    )
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Stop:
     """

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 from rrth_planner.collision import reference_checker
 from rrth_planner.execution.executing_motion import ExecutingMotion
+from rrth_planner.execution.flight_recorder import FlightRecorder
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box
 from rrth_planner.model.trajectory import sample, Trajectory
@@ -36,6 +37,8 @@ def without_separation(node):
 def know(monitor, **known):
     """Let a monitor know this, too, by the names of `Watch`."""
     monitor._watch = replace(monitor.watch, **known)
+    # What was decided before has nothing to do with that.
+    monitor.flight = FlightRecorder()
 
 
 class Monitored:

@@ -3,6 +3,7 @@
 """The monitor with separation: what it gives the controller, and what it leaves as it is."""
 
 from dataclasses import replace
+import pickle
 import time
 from types import FunctionType
 
@@ -22,10 +23,19 @@ from rrth_planner.execution.command import ahead, begin_of  # noqa: E402
 from rrth_planner.execution.commitment import extended  # noqa: E402
 from rrth_planner.execution.decide import IN_THE_WAY  # noqa: E402
 from rrth_planner.execution.executing_motion import ExecutingMotion, MAX_DEVIATION  # noqa: E402
+from rrth_planner.execution.flight_recorder import (  # noqa: E402
+    FlightRecorder,
+    MAGIC,
+    read_flight,
+    replay,
+)
 from rrth_planner.execution.separation_status import SeparationState  # noqa: E402
 from rrth_planner.execution.tracked_motion import forget_command  # noqa: E402
 from rrth_planner.execution.watch import MonitorState, MOST_IGNORED  # noqa: E402
-from rrth_planner.model.errors import RequestError  # noqa: E402
+from rrth_planner.model.errors import (
+    RecordError,  # noqa: E402
+    RequestError,  # noqa: E402
+)
 from rrth_planner.model.scene import Box, Scene  # noqa: E402
 from rrth_planner.model.status import ErrorCode  # noqa: E402
 from rrth_planner.model.trajectory import sample, Trajectory  # noqa: E402
@@ -573,6 +583,7 @@ def test_a_motion_that_could_not_be_published_leaves_the_stop_before_it_withheld
 ):
     arm, hand = beside(separated, 0.2)
     n = withheld(arm, monkeypatch)
+    arm.monitor.reset()
     with pytest.raises(ZeroDivisionError):
         arm.command(ExecutingMotion(trajectory=arm.motion, start_time=arm.now), lambda: 1 / 0)
     arm.frames(1, hand)
@@ -971,3 +982,104 @@ def test_an_arm_that_rests_beside_its_commitment_goes_on_from_where_it_is(separa
     trajectory, start = arm.published[-1]
     assert start > begin + kept.duration
     assert np.abs(trajectory.positions[0] - kept.positions[-1]).max() < 1e-4
+
+
+def goes_on(arm, hand):
+    """Let the arm go on, beside a hand and without bodies."""
+    arm.frames(10, sees=False)
+    arm.frames(60, hand)
+
+
+def is_stopped_and_goes_on_after_a_reset(arm, hand):
+    """Let a fault stop the arm, and another motion begin after a reset."""
+    arm.monitor.fail('an error', is_replanned=False)
+    arm.frames(40, hand)
+    arm.monitor.take_stops()
+    arm.monitor.reset()
+    arm.monitor.report_hold('of the test')
+    arm.command(ExecutingMotion(trajectory=arm.motion, start_time=arm.now + AHEAD), joins=None)
+    arm.frames(20, hand)
+
+
+def is_handed_over(arm, hand):
+    """Let another motion replace the running one."""
+    hand_over(arm)
+    arm.frames(30, hand)
+
+
+def cannot_be_published(arm, hand):
+    """Let no message go out for a while, and a motion be rejected."""
+    publishers = arm.monitor._publishers
+    publish, publishers.publish_motion = publishers.publish_motion, lambda *_: 1 / 0
+    arm.frames(5, hand)
+    arm.monitor.reset()
+    with pytest.raises(ZeroDivisionError):
+        arm.command(ExecutingMotion(trajectory=SWING, start_time=arm.now + AHEAD), joins=None)
+    publishers.publish_motion = publish
+    arm.frames(20, hand)
+
+
+def has_a_wearer_in_the_way(arm, _):
+    """Let a hand come into the way at once."""
+    arm.frames(40, near(0.0))
+
+
+FLIGHTS = (
+    goes_on,
+    is_stopped_and_goes_on_after_a_reset,
+    is_handed_over,
+    cannot_be_published,
+    has_a_wearer_in_the_way,
+)
+
+
+@pytest.fixture(name='flown', params=FLIGHTS)
+def _flown(request, separated):
+    arm, hand = separated(), near(0.3)
+    arm.monitor.flight = FlightRecorder()
+    arm.see(hand)
+    arm.command(ExecutingMotion(trajectory=SWING, start_time=arm.now + AHEAD), joins=None)
+    arm.frames(20, hand)
+    request.param(arm, hand)
+    return arm
+
+
+def test_what_was_decided_is_decided_again_to_the_bit(flown):
+    flight = read_flight(flown.monitor.flight.to_bytes())
+    found = list(replay(flight))
+    assert len(found) == len(flight.entries) > 60
+    assert all(one.is_same for one in found)
+    commands = [one.command for one in found if one.command is not None]
+    assert len(commands) >= 5
+    # Of what was published nothing is missing.
+    published = [motion for motion, _ in flown.published]
+    again = [command.motion.trajectory for command in commands]
+    for motion in published[-3:]:
+        assert any(
+            all(np.array_equal(a, b) for a, b in zip(motion.states, other.states, strict=True))
+            for other in again
+            if len(other.times) == len(motion.times)
+        )
+
+
+def test_a_replay_says_at_which_event_another_command_is_given(separated):
+    arm, hand = beside(separated, 0.3)
+    arm.monitor.flight = FlightRecorder()
+    arm.frames(20, hand)
+    flight = read_flight(arm.monitor.flight.to_bytes())
+    n = [k for k, entry in enumerate(flight.entries) if entry.command][3]
+    wrong = replace(flight.entries[n], command=bytes(16))
+    entries = (*flight.entries[:n], wrong, *flight.entries[n + 1 :])
+    found = list(replay(replace(flight, entries=entries)))
+    assert [one.number for one in found if not one.is_same] == [n]
+
+
+def test_only_values_of_this_package_are_read():
+    for content, sentence in (
+        (b'', 'another file'),
+        (MAGIC + pickle.dumps(len), 'builtins.len, expected values of this package'),
+        (MAGIC + b'\x80', 'damaged'),
+        (MAGIC + pickle.dumps(([], pickle.dumps(3), [])), 'no watch'),
+    ):
+        with pytest.raises(RecordError, match=sentence):
+            read_flight(content)

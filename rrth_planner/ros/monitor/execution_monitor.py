@@ -20,7 +20,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rrth_planner.execution.clock_watch import ClockWatch, watch_clock
 from rrth_planner.execution.decide import decide, LONGEST_WAIT
-from rrth_planner.execution.decision import Decision, Line
+from rrth_planner.execution.decision import Command, Decision, Line
 from rrth_planner.execution.event import (
     Begin,
     BodyCame,
@@ -41,6 +41,7 @@ from rrth_planner.execution.event import (
 )
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.fail_safe_stop import pending
+from rrth_planner.execution.flight_recorder import Fate, FlightRecorder
 from rrth_planner.execution.remaining_motion import is_ray_clear
 from rrth_planner.execution.watch import Level, MonitorState, Stop, Watch
 from rrth_planner.model.errors import one_line, RequestError
@@ -77,6 +78,7 @@ class ExecutionMonitor:
         # All calls come from the node's own thread, but `close` may come from another one.
         self._lock, self._is_closed = RLock(), False
         self._watch = Watch(rules=reporter.parameters, motion_topic=publishers.motion_topic)
+        self.flight = FlightRecorder()
         # The last body that the watch has seen.
         self._seen: WearerBody | None = None
         # The node's clock beside the steady one.
@@ -117,10 +119,15 @@ class ExecutionMonitor:
                 raise RequestError(ErrorCode.PREEMPTED, 'the planner is shutting down')
             self._check_clock()
             event = Begin(self._moment(), planned, goal, parameters, joins, planned_from)
-            decision = decide(self._watch, event)
-            publish()
-            self._publish(decision)
-            before, self._watch = self._watch, decision.watch
+            before, fate = self._watch, Fate.NONE
+            try:
+                decision = decide(before, event)
+                publish()
+                self._publish(decision)
+                self._watch, fate = decision.watch, Fate.KEPT
+            finally:
+                command = decision.command if fate is Fate.KEPT else None
+                self._remember(before, event, fate, command)
             # From here on the arm moves: an error must stop it.
             self._run_fail_safe(lambda: self._report(before, decision, 0.0))
             with suppress(Exception):
@@ -288,22 +295,15 @@ class ExecutionMonitor:
         arrived: when the body came that it is about [ns]; published: how long after its cause the
         stop was that it is about [s].
         """
-        begun = time.perf_counter()
-        before, decision = self._watch, decide(self._watch, event)
-        took = time.perf_counter() - begun
-        command = decision.command
-        if command is not None and took > command.within:
-            assert decision.otherwise is not None
-            decision = decision.otherwise
-        else:
-            try:
-                self._publish(decision)
-            except Exception:
-                if decision.otherwise is None or command is None or command.within < math.inf:
-                    raise
-                # A stop: it is tried again at the next check.
-                decision = replace(decision.otherwise, lines=(_error_line(),))
-        self._watch = decision.watch
+        begun, before, fate = time.perf_counter(), self._watch, Fate.NONE
+        command: Command | None = None
+        try:
+            decision = decide(before, event)
+            took, command = time.perf_counter() - begun, decision.command
+            decision, fate = self._carried_out(decision, took)
+            self._watch = decision.watch
+        finally:
+            self._remember(before, event, fate, command if fate is Fate.KEPT else None)
         if decision.is_stop:
             # An error in the report must not undo the stop.
             with suppress(Exception):
@@ -323,6 +323,26 @@ class ExecutionMonitor:
             if waited > LONGEST_WAIT:
                 self._take(BodyWaited(self._moment(), waited))
 
+    def _remember(self, watch: Watch, event: Event, fate: Fate, command: Command | None) -> None:
+        # What cannot be recorded is decided all the same.
+        with suppress(Exception):
+            self.flight.record(watch, event, fate, command)
+
+    def _carried_out(self, decision: Decision, took: float) -> tuple[Decision, Fate]:
+        """Publish what was decided in so long a time [s]; return what is to be kept."""
+        command = decision.command
+        if command is not None and took > command.within:
+            assert decision.otherwise is not None
+            return decision.otherwise, Fate.OTHERWISE
+        try:
+            self._publish(decision)
+        except Exception:
+            if decision.otherwise is None or command is None or command.within < math.inf:
+                raise
+            # A stop: it is tried again at the next check.
+            return replace(decision.otherwise, lines=(_error_line(),)), Fate.OTHERWISE
+        return decision, Fate.KEPT
+
     def _waited(
         self, before: Watch, decision: Decision, took: float, arrived: int | None
     ) -> float:
@@ -341,6 +361,7 @@ class ExecutionMonitor:
         except Exception:
             if self._watch is before:
                 self._watch = pending(before, event)
+                self._remember(before, event, Fate.PENDING, None)
             with suppress(Exception):
                 self._node.get_logger().error(traceback.format_exc())
 
