@@ -3,26 +3,27 @@
 """
 The last events that the guard decided about, to be decided again: the same to the bit.
 
-Rules, which are large and hardly ever change, are kept once, and events as bytes, since those of
-half a minute beside a tracker are many.
+Scenes are kept as names and numbers: those of half a minute beside a tracker are many. Rules,
+which are large and hardly ever change, are written once.
 """
 
 from collections import deque
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from enum import IntEnum
 import hashlib
 import importlib
 import io
 import pickle
-from typing import Any
+from typing import Any, cast
 
 from rrth_planner.execution.decide import decide
 from rrth_planner.execution.decision import Command
-from rrth_planner.execution.event import Event, Fail
+from rrth_planner.execution.event import Begin, BodyCame, Event, Fail
 from rrth_planner.execution.fail_safe_stop import pending
 from rrth_planner.execution.watch import MonitorRules, plain, PlainRules, Watch
 from rrth_planner.model.errors import RecordError
+from rrth_planner.model.scene import Scene, scene_of_bytes
 
 # How long it remembers, and after how long it keeps what is known by then [s].
 MEMORY, SEGMENT = 30.0, 1.0
@@ -45,7 +46,7 @@ ARRAYS = {
 # What builds values of those rooms from their parts.
 BUILDERS = {
     ('rrth_planner.model.frozen', '_made'),
-    ('rrth_planner.model.scene', '_of_rows'),
+    ('rrth_planner.model.scene', 'scene_of_bytes'),
     ('rrth_planner.model.trajectory', '_of_bytes'),
 }
 
@@ -70,15 +71,15 @@ class Entry:
 
     Parameters
     ----------
-    event : bytes
-        As `FlightRecorder` writes it.
+    event : Event or bytes
+        Bytes: as a file has it.
     fate : Fate
     command : bytes
         The digest of what was commanded; empty: nothing was.
 
     """
 
-    event: bytes
+    event: Event | bytes
     fate: Fate
     command: bytes
 
@@ -118,40 +119,90 @@ class FlightRecorder:
             self._segments.append((now, watch, []))
             while now - self._segments[0][0] > MEMORY + SEGMENT:
                 self._segments.popleft()
-        entry = Entry(self._written(event), fate, b'' if command is None else digest_of(command))
-        self._segments[-1][2].append(entry)
+        digest = b'' if command is None else digest_of(command)
+        self._segments[-1][2].append(Entry(_light(event), fate, digest))
 
     def to_bytes(self) -> bytes:
         """Return a file's content; `read_flight` reads it."""
         if not self._segments:
             raise RecordError('flight recorder: empty, expected at least one event')
-        first = self._written(self._segments[0][1])
-        entries = [(e.event, int(e.fate), e.command) for _, _, es in self._segments for e in es]
-        rules = [pickle.dumps(plain(one), protocol=5) for one in self._rules]
-        return MAGIC + pickle.dumps((rules, first, entries), protocol=5)
-
-    def _written(self, value: Any) -> bytes:
         buffer = io.BytesIO()
-        _Writer(buffer, self._rules).dump(value)
-        return buffer.getvalue()
+        _Writer(buffer, self._number).dump(self._segments[0][1])
+        kept = [entry for *_, entries in tuple(self._segments) for entry in tuple(entries)]
+        entries = [(self._event(one.event), int(one.fate), one.command) for one in kept]
+        rules = [pickle.dumps(plain(one), protocol=5) for one in self._rules]
+        return MAGIC + pickle.dumps((rules, buffer.getvalue(), entries), protocol=5)
+
+    def _event(self, event: Event | bytes) -> bytes:
+        """Return an event as bytes: much sooner without a look at each of its parts."""
+        assert isinstance(event, Event)
+        at = replace(event.at, rules=cast(MonitorRules, self._number(event.at.rules)))
+        event = replace(event, at=at)
+        if isinstance(event, Begin):
+            event = replace(event, rules=cast(MonitorRules, self._number(event.rules)))
+        return pickle.dumps(event, protocol=5)
+
+    def _number(self, rules: MonitorRules) -> int:
+        """Return the number of rules, kept from now on."""
+        for number, known in enumerate(self._rules):
+            if known is rules:
+                return number
+        self._rules.append(rules)
+        return len(self._rules) - 1
+
+
+def _light(event: Event) -> Event:
+    """Return an event with its scenes as names and numbers."""
+    if not isinstance(event, BodyCame):
+        return event
+    sight, look = event.sight, event.look
+    scene = None if sight is None else _packed(sight.scene)
+    if sight is not None and scene is not None:
+        sight = replace(sight, scene=scene)
+    if look is not None:
+        is_same = event.sight is not None and look.scene is event.sight.scene
+        place = scene if is_same and scene is not None else _packed(look.scene)
+        look = replace(look, scene=place, expected=_packed(look.expected))
+    return replace(event, sight=sight, look=look)
+
+
+def _full(event: Event) -> Event:
+    """Return an event with its scenes."""
+    if not isinstance(event, BodyCame):
+        return event
+    sight, look = event.sight, event.look
+    scenes: dict[int, Scene] = {}
+    if sight is not None:
+        sight = replace(sight, scene=_unpacked(sight.scene, scenes))
+    if look is not None:
+        scene, expected = (_unpacked(one, scenes) for one in (look.scene, look.expected))
+        look = replace(look, scene=scene, expected=expected)
+    return replace(event, sight=sight, look=look)
+
+
+def _packed(scene: Scene) -> Scene:
+    return cast(Scene, scene.__reduce__()[1])
+
+
+def _unpacked(scene: Scene, known: dict[int, Scene]) -> Scene:
+    packed = cast(tuple[tuple[str, ...], bytes], scene)
+    if id(scene) not in known:
+        known[id(scene)] = scene_of_bytes(*packed)
+    return known[id(scene)]
 
 
 class _Writer(pickle.Pickler):
     """Writes rules by their number."""
 
-    def __init__(self, file: io.BytesIO, rules: list[MonitorRules]) -> None:
+    def __init__(self, file: io.BytesIO, number: Callable[[MonitorRules], int]) -> None:
         super().__init__(file, protocol=5)
-        self._known = rules
+        self._number = number
 
     def persistent_id(self, value: Any) -> int | None:
         """Return the number of rules."""
         if not hasattr(type(value), 'ray_guard_length') or not hasattr(value, 'replan'):
             return None
-        for number, known in enumerate(self._known):
-            if known is value:
-                return number
-        self._known.append(value)
-        return len(self._known) - 1
+        return self._number(value)
 
 
 class _Reader(pickle.Unpickler):
@@ -234,11 +285,25 @@ def replay(flight: Flight) -> Iterator[Replayed]:
     """Decide about all events of a record again; each with whether the same was commanded."""
     watch = flight.watch
     for number, entry in enumerate(flight.entries):
-        event = _Reader(entry.event, list(flight.rules)).load()
-        if not isinstance(event, Event):
-            raise RecordError(f'flight record: entry {number} is no event')
+        event = _event_of(entry, flight.rules)
         watch, command, is_same = _decided(watch, event, entry)
         yield Replayed(number, event, command, is_same)
+
+
+def _event_of(entry: Entry, rules: tuple[PlainRules, ...]) -> Event:
+    try:
+        event = _Reader(cast(bytes, entry.event), []).load()
+        event = replace(event, at=replace(event.at, rules=rules[event.at.rules]))
+        if isinstance(event, Begin):
+            event = replace(event, rules=rules[cast(int, event.rules)])
+        event = _full(event)
+    except RecordError:
+        raise
+    except Exception as problem:
+        raise RecordError(f'flight record: damaged, {type(problem).__name__}') from problem
+    if not isinstance(event, Event):
+        raise RecordError(f'flight record: {type(event).__name__}, expected an event')
+    return event
 
 
 def _decided(watch: Watch, event: Event, entry: Entry) -> tuple[Watch, Command | None, bool]:
