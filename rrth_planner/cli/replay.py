@@ -1,8 +1,14 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Replay an incident: plan again from the same inputs, and compare all collision checkers."""
+"""
+Replay an incident: plan again from the same inputs, and compare all collision checkers.
+
+Or a flight record: decide about the same events again, and compare what is commanded.
+"""
 
 from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
 import sys
 import traceback
 from typing import TYPE_CHECKING
@@ -10,10 +16,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from rrth_planner.cli import plain_parsers
 from rrth_planner.cli.file_question import plan_of
-from rrth_planner.cli.program import run
+from rrth_planner.cli.program import run, say
 from rrth_planner.io.incident import Incident, IncidentKind, versions
 from rrth_planner.io.incident_file import read_incident
 from rrth_planner.model.trajectory import Trajectory
+
+# How the name of a flight record ends.
+FLIGHT = '.flight'
 
 if TYPE_CHECKING:
     from rrth_planner.collision.checker_comparison import MotionComparison
@@ -23,7 +32,19 @@ if TYPE_CHECKING:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Replay the incident of a file and return the exit code."""
     options = plain_parsers.replay().parse_args(arguments)
-    return run('replay', lambda: replay(read_incident(options.file)), 2)
+    return run('replay', lambda: _replay_file(Path(options.file)), 2)
+
+
+def _replay_file(file: Path) -> int:
+    if file.suffix == FLIGHT:
+        # It compiles kernels before what needs them is loaded.
+        from rrth_planner.kernels.precompile import prepare_kernels
+
+        prepare_kernels(partial(say, 'replay'))
+        from rrth_planner.cli.flight_replay import replay_flight
+
+        return replay_flight(file)
+    return replay(read_incident(file))
 
 
 def replay(incident: Incident) -> int:

@@ -93,6 +93,8 @@ class Replayed:
     ----------
     number : int
         From 0.
+    watch : Watch
+        What is known after it.
     is_same : bool
         Whether the same was commanded.
 
@@ -100,6 +102,7 @@ class Replayed:
 
     number: int
     event: Event
+    watch: Watch
     command: Command | None
     is_same: bool
 
@@ -287,7 +290,7 @@ def replay(flight: Flight) -> Iterator[Replayed]:
     for number, entry in enumerate(flight.entries):
         event = _event_of(entry, flight.rules)
         watch, command, is_same = _decided(watch, event, entry)
-        yield Replayed(number, event, command, is_same)
+        yield Replayed(number, event, watch, command, is_same)
 
 
 def _event_of(entry: Entry, rules: tuple[PlainRules, ...]) -> Event:

@@ -26,7 +26,6 @@ from rrth_planner.planning.options import ALGORITHMS, TreeOptions
 # Version of the record's layout; others are rejected.
 FORMAT = 5
 MOST_FILES = 100
-PATTERN = 'incident-*.yaml'
 # Of the numbers of a record, by the names of their fields.
 UNITS = {
     **dict.fromkeys((*LENGTHS, 'distance', 'radius', 'body_error'), 'm'),
@@ -47,17 +46,28 @@ def write_incident(incident: Incident, folder: Path) -> Path:
 
     Creates the folder if needed, and writes the file atomically; raises OSError where it cannot.
     """
+    content = incident_to_yaml(incident).encode()
+    return write_record(content, folder, 'incident', incident.time, '.yaml')
+
+
+def write_record(content: bytes, folder: Path, kind: str, time: str, suffix: str) -> Path:
+    """
+    Write a new file of a kind to a folder, and remove the oldest of that kind beyond a hundred.
+
+    time: as ISO 8601 has it. Creates the folder if needed, and writes the file atomically; raises
+    OSError where it cannot.
+    """
     folder.mkdir(parents=True, exist_ok=True)
-    stamp = ''.join(c for c in incident.time[:26] if c.isalnum())
-    path = folder / f'incident-{stamp}-{uuid.uuid4().hex[:6]}.yaml'
+    stamp = ''.join(c for c in time[:26] if c.isalnum())
+    path = folder / f'{kind}-{stamp}-{uuid.uuid4().hex[:6]}{suffix}'
     fresh = path.with_suffix('.part')
     try:
-        fresh.write_text(incident_to_yaml(incident), encoding='utf-8')
+        fresh.write_bytes(content)
         os.replace(fresh, path)
     finally:
         fresh.unlink(missing_ok=True)
     with suppress(OSError):
-        _remove_oldest(folder, path)
+        _remove_oldest(folder, path, f'{kind}-*{suffix}')
     return path
 
 
@@ -68,9 +78,9 @@ def read_incident(path: Path) -> Incident:
         return incident_from_mapping(data)
 
 
-def _remove_oldest(folder: Path, newest: Path) -> None:
+def _remove_oldest(folder: Path, newest: Path, pattern: str) -> None:
     """Remove the oldest files; the newest stays, whatever its time stamp."""
-    others = [file for file in folder.glob(PATTERN) if file != newest]
+    others = [file for file in folder.glob(pattern) if file != newest]
     others.sort(key=lambda file: (file.stat().st_mtime_ns, file.name), reverse=True)
     for file in others[MOST_FILES - 1 :]:
         file.unlink(missing_ok=True)

@@ -15,6 +15,7 @@ pytest.importorskip('rclpy')
 from monitored import ARM, FAR, know, Monitored  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
+from rrth_planner.cli import replay as replay_command  # noqa: E402
 from rrth_planner.collision import reference_checker, separation  # noqa: E402
 from rrth_planner.collision.reference_checker import separation_violations  # noqa: E402
 from rrth_planner.execution import commitments  # noqa: E402
@@ -1083,3 +1084,15 @@ def test_only_values_of_this_package_are_read():
     ):
         with pytest.raises(RecordError, match=sentence):
             read_flight(content)
+
+
+def test_a_flight_is_replayed_by_a_command(flown, tmp_path, capsys):
+    file = tmp_path / 'of_the_test.flight'
+    file.write_bytes(flown.monitor.flight.to_bytes())
+    assert replay_command.main([str(file)]) == 0
+    *lines, last = capsys.readouterr().out.splitlines()
+    assert last == 'reproduced: every command is the same as recorded, to the bit'
+    assert any('monitoring' in line for line in lines)
+    file.write_bytes(file.read_bytes()[:-100])
+    assert replay_command.main([str(file)]) == 2
+    assert 'flight record: damaged' in capsys.readouterr().err
