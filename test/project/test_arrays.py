@@ -90,7 +90,6 @@ WHOLE_FORMS = {
     'whole numbers': lambda q: q.astype(int),
     'list of whole numbers': lambda q: q.astype(int).tolist(),
     'int8': lambda q: q.astype(np.int8),
-    'uint16': lambda q: q.astype(np.uint16),
 }
 NO_ARRAYS = {
     'another length': lambda q: np.append(q, q, axis=-1)[..., :-1],
