@@ -1,8 +1,8 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""A tracker that reports a part at its origin: real nodes neither believe it nor plan without."""
+"""Real nodes from tracker to planner: parts that are not believed, and others in the picture."""
 
-from contextlib import ExitStack
+from contextlib import contextmanager, ExitStack
 from dataclasses import replace
 
 import pytest
@@ -19,11 +19,12 @@ from rrth_planner.io.skeleton_file import load_skeleton  # noqa: E402
 from rrth_planner.ros.client.stand_in_publisher import DRIVERS  # noqa: E402
 from rrth_planner.ros.messages.tracked_person import points_to_msg, poses_to_msg  # noqa: E402
 from rrth_planner.ros.middleware.child_process import ChildProcess  # noqa: E402
+from rrth_planner.wearer.body_boxes import base_pose  # noqa: E402
 from rrth_planner.wearer.recorded_person import posture_at  # noqa: E402
 from rrth_planner.wearer.stand_in import stand_in  # noqa: E402
 import samples  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
-from visualization_msgs.msg import MarkerArray  # noqa: E402
+from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
 
 pytestmark = [pytest.mark.usefixtures('ros_context'), pytest.mark.slow]
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -43,6 +44,8 @@ class Tracker(Node):
         """Create publishers, the client of the planner, and what hears the boxes."""
         super().__init__('tracker')
         self.driver, self.lost, self.boxes = DRIVERS[driver], (), []
+        # How far others, who look alike, stand from him, by their numbers (3,) [m].
+        self.others = {}
         skeleton = load_skeleton('cmu_bvh')
         posture = posture_at(load_person(), 0.0)
         self.skeleton = load_skeleton(self.driver.skeleton)
@@ -60,7 +63,7 @@ class Tracker(Node):
         self.create_timer(1.0 / 30.0, self._publish)
 
     def _hear(self, msg):
-        self.boxes = sorted(marker.text for marker in msg.markers)
+        self.boxes = sorted(m.text for m in msg.markers if m.action == Marker.ADD)
 
     def _publish(self):
         positions = self.seen.positions.copy()
@@ -71,6 +74,12 @@ class Tracker(Node):
             msg = points_to_msg(seen, self.skeleton, self.driver.frame, stamp)
             for marker in msg.markers:
                 marker.id += 100
+            for number, aside in dict(self.others).items():
+                there = replace(self.seen, positions=self.seen.positions + aside)
+                other = points_to_msg(there, self.skeleton, self.driver.frame, stamp)
+                for marker in other.markers:
+                    marker.id += 100 * number
+                msg.markers.extend(other.markers)
             self.by_name[''].publish(msg)
             return
         poses = poses_to_msg(seen, self.skeleton, self.driver.frame, stamp)
@@ -93,6 +102,33 @@ class Tracker(Node):
         return '' if answer.success else answer.message
 
 
+@contextmanager
+def running(tracker, said, planner, source=()):
+    """Have the nodes from a tracker to an arm run, with parameters of planner and boxes."""
+    # A tracker on a busy machine: ages are not what this is about.
+    planner = ['separation:=false', 'body_timeout:=20.0', *planner]
+    options = [*tracker.source(), *parameters(source)]
+    nodes = {
+        'rrth_planner.ros.body_boxes_node': options,
+        'rrth_planner.ros.playback_node': [],
+        'rrth_planner.ros.planner_node': parameters(planner),
+    }
+    with ExitStack() as stack:
+        for module, words in nodes.items():
+            process = ChildProcess(module, ['--ros-args', *words], said.append)
+            stack.enter_context(process)
+        stack.enter_context(spinning(tracker))
+        wait_until(tracker.plan.service_is_ready, 8 * LONGEST_WAIT)
+        wait_until(lambda: tracker.boxes)
+        yield
+    tracker.destroy_node()
+
+
+def parameters(values):
+    """Return the words of a command line."""
+    return [word for value in values for word in ('-p', value)]
+
+
 def refused(tracker):
     """Return why the planner does not plan; fail where it does."""
     sentence = tracker.rejection()
@@ -105,20 +141,7 @@ def refused(tracker):
 def test_nothing_is_planned_without_a_required_part_that_is_not_believed(driver, is_seen_first):
     tracker, said = Tracker(driver), []
     tracker.lost = () if is_seen_first else LOST[driver]
-    # A tracker on a busy machine: ages are not what this is about.
-    planner = ['separation:=false', 'body_timeout:=20.0', "required_boxes:=['torso','left hand']"]
-    nodes = {
-        'rrth_planner.ros.body_boxes_node': tracker.source(),
-        'rrth_planner.ros.playback_node': [],
-        'rrth_planner.ros.planner_node': [word for p in planner for word in ('-p', p)],
-    }
-    with ExitStack() as stack:
-        for module, options in nodes.items():
-            process = ChildProcess(module, ['--ros-args', *options], said.append)
-            stack.enter_context(process)
-        stack.enter_context(spinning(tracker))
-        wait_until(tracker.plan.service_is_ready, 8 * LONGEST_WAIT)
-        wait_until(lambda: tracker.boxes)
+    with running(tracker, said, ["required_boxes:=['torso','left hand']"]):
         send(tracker, tracker.target, samples.target())
         if is_seen_first:
             assert ask(tracker.plan).success, said
@@ -137,5 +160,22 @@ def test_nothing_is_planned_without_a_required_part_that_is_not_believed(driver,
         # The hand is seen again.
         tracker.lost = ()
         wait_until(lambda: not tracker.rejection())
-        assert set(PARTS) <= set(tracker.boxes)
-    tracker.destroy_node()
+        wait_until(lambda: set(PARTS) <= set(tracker.boxes))
+
+
+def test_where_a_bystander_stood_is_free_once_he_has_left():
+    tracker, said = Tracker('kinect'), []
+    # The other stands before him, where the target is.
+    forward = base_pose(tracker.skeleton, tracker.seen)[:3, 0]
+    bystander = {2: 1.5 * forward}
+    tracker.others = bystander
+    with running(tracker, said, [], ['person:=1']):
+        send(tracker, tracker.target, samples.target())
+        for _ in range(2):
+            wait_until(lambda: 'person 2' in tracker.boxes)
+            wait_until(lambda: 'person 2' in tracker.rejection())
+            # He leaves, and later comes back.
+            tracker.others = {}
+            wait_until(lambda: not tracker.rejection())
+            wait_until(lambda: 'person 2' not in tracker.boxes)
+            tracker.others = bystander
