@@ -2,10 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Files of motion capture as other programs write them, made up."""
 
+from dataclasses import replace
 import struct
 import warnings
 
 import numpy as np
+from rrth_planner.io.motion_capture_file import load_person
+from rrth_planner.io.person_file import write_person
+from rrth_planner.wearer.recorded_person import excerpt
 
 # The joint before each, its offset [cm], and the order of its rotations.
 JOINTS = (
@@ -69,6 +73,13 @@ def write_c3d(path, names, positions, unit='mm', lost=()):
     with warnings.catch_warnings(), path.open('wb') as file:
         warnings.simplefilter('ignore')
         writer.write(file)
+
+
+def write_child(path):
+    """Write the packaged person, of 70 % of his size, as a table of half a second."""
+    person = excerpt(load_person(), 0.0, 0.5)
+    write_person(replace(person, positions=0.7 * person.positions), path)
+    return path
 
 
 def set_frames(path, first, last):

@@ -79,18 +79,29 @@ def nothing_free(
     found: 'FreeShare', scene: Scene, settings: PlanSettings, arm_at: Callable[[Array], ArmModel]
 ) -> str:
     """Return what to do where none is free; arm_at: the arm mounted at a pose, (4, 4) [m]."""
+    most, there = 0.0, found
     for place in PLACES:
-        T = pose_matrix(place[:3], place[3:])
-        if free_share_of(arm_at(T), scene, settings, 'plan').share > ROOM:
-            mount = ' '.join(f'{value:g}' for value in place)
-            remedy = f'give --mount X Y Z QX QY QZ QW, where it has room, such as --mount {mount}'
+        there = free_share_of(arm_at(pose_matrix(place[:3], place[3:])), scene, settings, 'plan')
+        if there.share > most:
+            most, mount = there.share, ' '.join(f'{value:g}' for value in place)
+        if most > ROOM:
             break
-    else:
+    worn = {box.name for box in scene.boxes}
+    # Where nothing is free far from the wearer either, it may be the arm itself.
+    itself = tuple(pair for pair in there.causes if pair[1] not in worn)
+    causes = found.causes
+    if most > 0.0:
+        where = 'where it has room' if most > ROOM else f'where {100.0 * most:.1f} % are free'
+        remedy = f'give --mount X Y Z QX QY QZ QW, {where}, such as --mount {mount}'
+    elif itself:
+        causes = itself
         remedy = (
             'let pairs of its parts meet that cannot in truth (allowed in the file of the arm; '
             '--srdf of read_urdf)'
         )
-    cause = ' and '.join(f'"{part}"' for part in found.causes[0]) if found.causes else 'its parts'
+    else:
+        remedy = 'give --mount X Y Z QX QY QZ QW farther away than 2 m, or smaller capsules'
+    cause = ' and '.join(f'"{part}"' for part in causes[0]) if causes else 'its parts'
     return (
         f'{remedy}: none of 1000 configurations is free of the wearer and of the arm itself; most '
         f'often {cause} collide'

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from rrth_planner.cli.numbers import integer, number, number_of_runs, number_of_workers
-from rrth_planner.cli.program import add_files, add_target, command_parser, program
+from rrth_planner.cli.program import add_files, add_size, add_target, command_parser, program
 
 PLAN = """\
 Plan one motion after which the arm's pointing ray meets a target, and which keeps the margin from
@@ -267,12 +267,7 @@ def viewer() -> argparse.ArgumentParser:
         metavar='NAME',
         help='what makes boxes of that recording (%(default)s)',
     )
-    add(
-        '--unit',
-        metavar='UNIT',
-        help='of its lengths: m, cm, mm, inch, foot, or how long it is [m] (what it says, or an '
-        'adult measures)',
-    )
+    add_size(parser)
     add(
         '--urdf',
         type=Path,

@@ -46,6 +46,24 @@ def add_files(parser: argparse.ArgumentParser, **helps: str) -> None:
         parser.add_argument(f'--{name}', type=Path, metavar='FILE', help=text)
 
 
+def add_size(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say how large a recorded person is."""
+    parser.add_argument(
+        '--stature',
+        type=number('m'),
+        nargs='+',
+        default=(1.4, 2.0),
+        metavar='M',
+        help='of the person, or of the smallest and the largest one [m] (1.4 2.0)',
+    )
+    parser.add_argument(
+        '--unit',
+        metavar='UNIT',
+        help='of its lengths: m, cm, mm, inch, foot, or how long it is [m] (what it says, or an '
+        'adult measures)',
+    )
+
+
 def add_target(parser: argparse.ArgumentParser, text: str, required: bool = True) -> None:
     """Add the option of a target, with its help."""
     xyz = ('X', 'Y', 'Z')

@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 
 from rrth_planner.cli.numbers import integer, number
-from rrth_planner.cli.program import command_parser
+from rrth_planner.cli.program import add_size, command_parser
 
 # What `record` records: all topics of a planner and an arm, with their types.
 TOPICS = {
@@ -195,20 +195,7 @@ def wearer() -> argparse.ArgumentParser:
         metavar='NAME',
         help='what makes boxes of the points: one of config/skeletons, or a file (%(default)s)',
     )
-    add(
-        '--stature',
-        type=number('m'),
-        nargs='+',
-        default=(1.4, 2.0),
-        metavar='M',
-        help='of the person, or of the smallest and the largest one [m] (1.4 2.0)',
-    )
-    add(
-        '--unit',
-        metavar='UNIT',
-        help='of its lengths: m, cm, mm, inch, foot, or how long it is [m] (what it says, or an '
-        'adult measures)',
-    )
+    add_size(command)
     return command
 
 
@@ -259,6 +246,7 @@ def simulate() -> argparse.ArgumentParser:
     add('--begin', type=number('s'), default=0.0, metavar='S', help=begin)
     add('--end', type=number('s'), default=0.0, metavar='S', help='end of --file [s]; 0: its end')
     add('--skeleton', default='cmu_bvh', metavar='NAME', help='skeleton of --file (%(default)s)')
+    add_size(command)
     add(
         '--lag',
         type=number('m', above=0.0),

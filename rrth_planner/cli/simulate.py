@@ -211,6 +211,8 @@ def _simulation_words(options: argparse.Namespace) -> list[str]:
         'wearer': options.wearer,
         'wearer_file': f"'{options.file or ''}'",
         'skeleton': options.skeleton,
+        'stature': [float(stature) for stature in options.stature],
+        'wearer_unit': f"'{options.unit or ''}'",
         'lag': options.lag,
         'payload': options.payload,
     }

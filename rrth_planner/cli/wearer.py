@@ -49,9 +49,7 @@ def _publish(options: argparse.Namespace, given: Sequence[str]) -> None:
     )
     person = load_person(options.file, unit=options.unit, say=lambda words: say('wearer', words))
     person = excerpt(person, options.begin, options.end)
-    if len(options.stature) > 2:
-        raise OptionsError(f'--stature: {len(options.stature)} values, expected one or two [m]')
-    skeleton = load_skeleton(options.skeleton, (options.stature[0], options.stature[-1]))
+    skeleton = load_skeleton(options.skeleton, options.stature)
     if options.form == 'boxes' or driver:
         # A skeleton of another tracker is named at once.
         try:

@@ -14,6 +14,7 @@ from rrth_planner.kernels.collision.trajectory_check import prove_pieces
 from rrth_planner.kernels.trajectory.quintics import bound
 from rrth_planner.model.arrays import Array, check_dof, float_number
 from rrth_planner.model.bernstein import to_bernstein
+from rrth_planner.model.errors import check_type
 from rrth_planner.model.trajectory import piece_coefficients, Trajectory
 
 # Sampling period of the least clearance: a figure for people, not part of the certificate [s].
@@ -58,6 +59,8 @@ def certify(trajectory: Trajectory, world: World, begin: float = 0.0) -> Certifi
     Each piece is checked continuously by `kernels.collision.arm_validity.prove_curve`, with
     second-order bounds and the numbers that the trajectory holds, from the time `begin` on [s].
     """
+    check_type(trajectory, Trajectory, 'trajectory')
+    check_type(world, World, 'world')
     check_dof(trajectory.positions, world.bounds.shape[1], 'trajectory')
     begin = float_number(begin, 'begin', 's')
     if len(trajectory.times) == 1 or begin >= trajectory.duration:

@@ -26,7 +26,7 @@ from rrth_planner.model.arm import (
     mount_bars,
 )
 from rrth_planner.model.arrays import Array, FARTHEST, float_array, float_number
-from rrth_planner.model.errors import OptionsError, RrthError
+from rrth_planner.model.errors import check_type, OptionsError, RrthError
 from rrth_planner.model.frozen import Frozen, read_only
 from rrth_planner.model.joint_range import bounds_from
 from rrth_planner.model.reach import reach_table
@@ -219,6 +219,8 @@ def arm_world(arm: ArmModel, scene: Scene, margin: float, ray_guard_length: floa
         A margin or a ray_guard_length that is negative, not a number or beyond 1e4 m.
 
     """
+    check_type(arm, ArmModel, 'arm')
+    check_type(scene, Scene, 'scene')
     margin = float_number(margin, 'margin', 'm', 0.0, FARTHEST, OptionsError)
     ray_guard_length = float_number(
         ray_guard_length, 'ray_guard_length', 'm', 0.0, FARTHEST, OptionsError

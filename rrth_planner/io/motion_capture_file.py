@@ -203,7 +203,9 @@ def _measures(rest: Array, scale: float, size: float) -> str:
     # Left and right mirror each other; of the other two axes the longer one is up.
     skew = [np.abs(np.sort(rest[:, k]) + np.sort(rest[:, k])[::-1]).max() for k in range(3)]
     lateral = int(np.argmin(np.where(extents > 0.0, skew, np.inf)))
-    height = scale * float(max(extents[k] for k in range(3) if k != lateral))
+    # A spine alone has no left and right.
+    upright = [k for k in range(3) if k != lateral and extents[k] > 0.0] or [lateral]
+    height = scale * float(extents[upright].max())
     tall = f'the skeleton is {height:.2f} m tall'
     return tall if height >= TALL else f'{tall}, and {size:.2f} m from end to end'
 

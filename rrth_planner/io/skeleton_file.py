@@ -11,7 +11,7 @@ import numpy as np
 from rrth_planner.io.entries import mapping, number, sequence, text
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.text_file import load_yaml, naming_file
-from rrth_planner.model.arrays import Array, frozen_array
+from rrth_planner.model.arrays import Array, float_array, frozen_array
 from rrth_planner.model.errors import SceneError, shown
 from rrth_planner.wearer.skeleton import (
     AXES,
@@ -50,14 +50,14 @@ def load_skeleton(name_or_path: str | Path, stature: Sequence[float] = STATURES)
 
     Parameters
     ----------
-    stature : sequence of 2 floats
-        Of the smallest and of the largest wearer [m]; by default of any adult.
+    stature : sequence of 1 or 2 floats
+        Of the wearer, or of the smallest and of the largest one [m]; by default of any adult.
 
     Raises
     ------
     ModelError, SceneError
         There is no such skeleton, the file cannot be read, or it describes none; a stature
-        outside 0.5 to 2.8.
+        outside 0.5 to 2.8, none or more than two.
 
     """
     is_file = str(name_or_path).endswith('.yaml')
@@ -70,7 +70,10 @@ def load_skeleton(name_or_path: str | Path, stature: Sequence[float] = STATURES)
     data = load_yaml(path)
     with naming_file(path, SceneError):
         skeleton = skeleton_from_mapping(data, adult['parts'], adult['bones'])
-    return replace(skeleton, stature=np.array(stature))
+    given = float_array(stature, (None,), 'stature', 'm', SceneError)
+    if len(given) not in (1, 2):
+        raise SceneError(f'stature: {len(given)} values, expected one or two [m]')
+    return replace(skeleton, stature=given[[0, -1]])
 
 
 def skeleton_from_mapping(

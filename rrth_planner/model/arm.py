@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from rrth_planner.kernels.layout import MAX_BARS, MAX_DOF, NO_BAR
 from rrth_planner.model.arrays import Array, FARTHEST, float_array, float_number, frozen_array
-from rrth_planner.model.errors import ModelError, printable
+from rrth_planner.model.errors import check_type, ModelError, printable
 from rrth_planner.model.frozen import Frozen
 
 # Radius of a row whose offsets are no bars.
@@ -281,6 +281,7 @@ def forward_kinematics(arm: ArmModel, q: ArrayLike) -> Array:
     leaves its origin along its +z. Numbers that are not finite, and another number of joints,
     raise an RrthError.
     """
+    check_type(arm, ArmModel, 'arm')
     poses = link_poses(arm, float_array(q, (..., arm.dof), 'q', 'rad or m'))
     T = arm.T_base_mount
     for i in range(arm.dof + 1):

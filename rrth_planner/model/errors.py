@@ -80,6 +80,13 @@ class RecordError(RrthError):
     """An incomplete or invalid record."""
 
 
+def check_type(value: Any, kind: Any, name: str, error: type[RrthError] = RrthError) -> None:
+    """Raise an error unless an argument is of a class, which the sentence names."""
+    if not isinstance(value, kind):
+        article = 'an' if kind.__name__[0] in 'AEIO' else 'a'
+        raise error(f'{name}: {shown(value)}, expected {article} {kind.__name__}')
+
+
 def printable(value: Any, name: str, error: type[RrthError]) -> str:
     """
     Return a name, which sentences may quote, or raise.

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from rrth_planner.kernels.layout import MAX_BOXES, NUMBERS, ORTHOGONAL, ROTATION, SIZE
 from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
-from rrth_planner.model.errors import printable, SceneError
+from rrth_planner.model.errors import check_type, printable, SceneError
 from rrth_planner.model.frozen import Frozen
 
 
@@ -102,6 +102,8 @@ class Scene:
     def __post_init__(self) -> None:
         """Validate and freeze the collection."""
         boxes = tuple(self.boxes)
+        for box in boxes:
+            check_type(box, Box, 'boxes', SceneError)
         if len(boxes) > MAX_BOXES:
             raise SceneError(f'boxes: {len(boxes)}, expected at most {MAX_BOXES}')
         object.__setattr__(self, 'boxes', boxes)

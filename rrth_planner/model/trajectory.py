@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from rrth_planner.model.arrays import Array, FARTHEST, float_array, frozen_array
-from rrth_planner.model.errors import OptionsError, RrthError
+from rrth_planner.model.errors import check_type, OptionsError, RrthError
 from rrth_planner.model.frozen import Frozen
 
 # Greatest speed of a joint at rest [rad/s].
@@ -211,6 +211,7 @@ def sample(trajectory: Trajectory, times: ArrayLike) -> tuple[Array, Array, Arra
     Positions [rad], velocities [rad/s] and accelerations [rad/s^2], each (m, dof); of a single
     time, (): (1, dof).
     """
+    check_type(trajectory, Trajectory, 'trajectory')
     t = float_array(times, (...,), 'times', 's')
     if t.ndim != 1:
         # One time, or what is no list of times.

@@ -17,6 +17,7 @@ from rrth_planner.collision.world import arm_world, grown, with_start, World
 from rrth_planner.kernels import jit
 from rrth_planner.model.arm import ArmModel, reach_to, tool_pose
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import check_type, OptionsError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.joint_range import joints_beyond
 from rrth_planner.model.path import Path
@@ -116,11 +117,13 @@ def plan_motion(
     Raises
     ------
     OptionsError
-        A number out of its range, or values of another number of joints than the arm's.
+        A number out of its range, an argument of another type, or values of another number of
+        joints than the arm's.
     ModelError
         The library of the second checker is not installed.
 
     """
+    check_type(should_stop, Callable, 'should_stop', OptionsError)
     question = PlanQuestion(
         arm=arm,
         scene=scene,
@@ -230,6 +233,7 @@ def warm_up(arm: ArmModel, options: TreeOptions, second_checker: str = 'fcl') ->
         The arm cannot point, or the library of the second checker is not installed.
 
     """
+    check_type(arm, ArmModel, 'arm')
     check_pointing_arm(arm)
     q_start = arm.bounds.mean(axis=0)
     T = tool_pose(arm, q_start)

@@ -11,13 +11,26 @@ import numpy as np
 from rrth_planner.collision.distance_library import LIBRARIES
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array, FARTHEST, float_number, frozen_array
-from rrth_planner.model.errors import OptionsError, shown
+from rrth_planner.model.errors import check_type, OptionsError, shown
 from rrth_planner.model.frozen import Frozen
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.separation import SeparationRules
 from rrth_planner.model.trajectory import MotionLimits, StartState
 from rrth_planner.planning.options import TreeOptions
+
+_KINDS: dict[str, type[Any]] = {
+    'arm': ArmModel,
+    'scene': Scene,
+    'goal': PointingGoal,
+    'limits': MotionLimits,
+    'options': TreeOptions,
+}
+_OPTIONAL: dict[str, type[Any]] = {
+    'moving': StartState,
+    'rules': SeparationRules,
+    'stop_limits': MotionLimits,
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -47,7 +60,8 @@ class PlanQuestion(Frozen):
     Raises
     ------
     OptionsError
-        A number out of its range, or values of another number of joints than the arm's.
+        A number out of its range, an argument of another type, or values of another number of
+        joints than the arm's.
 
     """
 
@@ -70,6 +84,11 @@ class PlanQuestion(Frozen):
 
     def __post_init__(self) -> None:
         """Validate and freeze."""
+        for name, kind in _KINDS.items():
+            check_type(getattr(self, name), kind, name, OptionsError)
+        for name, kind in _OPTIONAL.items():
+            if getattr(self, name) is not None:
+                check_type(getattr(self, name), kind, name, OptionsError)
         dof = self.arm.dof
         q_start = frozen_array(self.q_start, (dof,), 'q_start', 'rad', OptionsError)
         object.__setattr__(self, 'q_start', q_start)
@@ -88,7 +107,7 @@ class PlanQuestion(Frozen):
             object.__setattr__(self, name, value)
         age = float_number(self.body_age, 'body_age', 's', 0.0, FARTHEST, OptionsError)
         object.__setattr__(self, 'body_age', age)
-        if self.second_checker not in LIBRARIES:
+        if self.second_checker not in tuple(LIBRARIES):
             raise OptionsError(
                 f'second_checker: {shown(self.second_checker)}, expected {" or ".join(LIBRARIES)}'
             )

@@ -11,7 +11,7 @@ from rrth_planner.kernels.collision import edge_contacts, map_validity
 from rrth_planner.kernels.kinematics import generated_fk
 from rrth_planner.kernels.layout import MAX_DOF
 from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
-from rrth_planner.model.errors import printable, SceneError
+from rrth_planner.model.errors import check_type, printable, SceneError
 from rrth_planner.model.frozen import Frozen
 from rrth_planner.planning.problem import PlanningProblem
 
@@ -96,6 +96,7 @@ class BoxMap(Frozen):
 
 def map_world(box_map: BoxMap) -> World:
     """Return the world of a point on a map; its edge check is exact."""
+    check_type(box_map, BoxMap, 'box_map')
     low, high = box_map.bounds
     beyond = high - low
     lower, upper = np.array(box_map.obstacles[:, 0]), np.array(box_map.obstacles[:, 1])
@@ -117,6 +118,7 @@ def map_world(box_map: BoxMap) -> World:
 
 def map_problem(box_map: BoxMap, world: World | None = None) -> PlanningProblem:
     """Return the planning problem of a map, in its own world or in another one made from it."""
+    check_type(box_map, BoxMap, 'box_map')
     return PlanningProblem(
         world=map_world(box_map) if world is None else world,
         q_start=box_map.start,

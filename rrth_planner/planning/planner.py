@@ -7,7 +7,7 @@ import functools
 from importlib import import_module
 
 import numpy as np
-from rrth_planner.model.errors import OptionsError
+from rrth_planner.model.errors import check_type, OptionsError, RrthError, shown
 from rrth_planner.planning.deadline import Deadline
 from rrth_planner.planning.options import (
     InformedRRTStarOptions,
@@ -66,13 +66,23 @@ def plan(
     OptionsError
         Options of an unknown algorithm.
     RrthError
-        An earlier plan with another number of joints.
+        An argument of another type, as a whole number for rng; an earlier plan with another
+        number of joints.
 
     """
+    check_type(problem, PlanningProblem, 'problem')
     home = _SEARCH.get(type(options))
     if home is None:
         names = ', '.join(kind.__name__ for kind in _SEARCH)
         raise OptionsError(f'options: {type(options).__name__}, expected one of {names}')
+    if not isinstance(rng, np.random.Generator):
+        raise RrthError(
+            f'rng: {shown(rng)}, expected a numpy.random.Generator, as from '
+            'numpy.random.default_rng(1)'
+        )
+    check_type(should_stop, Callable, 'should_stop')
+    if previous is not None:
+        check_type(previous, PlanResult, 'previous')
     # Compiling, the first time, is not planning: the clock starts afterwards.
     search = _search_of(home)
     deadline = Deadline(options.time_limit, should_stop)

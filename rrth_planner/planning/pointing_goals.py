@@ -16,7 +16,7 @@ from rrth_planner.kernels.kinematics import pan_tilt_ik
 from rrth_planner.kernels.kinematics.goal_selection import find_goals
 from rrth_planner.model.arm import ArmModel, forward_kinematics
 from rrth_planner.model.arrays import Array, check_dof, float_array
-from rrth_planner.model.errors import ModelError
+from rrth_planner.model.errors import check_type, ModelError, RrthError, shown
 from rrth_planner.model.frozen import Frozen
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.joint_range import turns_near
@@ -24,6 +24,8 @@ from rrth_planner.planning.problem import PlanningProblem
 
 # Samples of the joints: few are enough mostly; many before all are reported as not free.
 FEW, MANY = 176, 4096
+# Half of the most candidates that a caller may ask for.
+MOST_DRAWS = 10**7
 # Shares of a turn round q_near from which joints that turn freely are drawn, too, since few of the
 # draws from a whole turn are near.
 SHARES = (0.5, 0.25)
@@ -165,11 +167,17 @@ def goal_configurations(
     Raises
     ------
     RrthError
-        A q_near that is no (dof,) finite numbers, or the world of another number of joints.
+        A q_near that is no (dof,) finite numbers, an n_draws that is no whole number from 0 to
+        1e7, an argument of another type, or the world of another number of joints.
 
     """
+    _check_types(arm, goal, world)
     q_near = float_array(q_near, (arm.dof,), 'q_near', 'rad')
     check_dof(world.bounds, arm.dof, 'world')
+    if not isinstance(n_draws, (int, np.integer)) or not 0 <= n_draws <= MOST_DRAWS:
+        raise RrthError(
+            f'n_draws: {shown(n_draws)}, expected a whole number from 0 to {MOST_DRAWS} [-]'
+        )
     bounds = turns_near(arm, world.bounds, q_near, 1.0)
     found = _goals_within(arm, goal, world, bounds, q_near, n_draws)
     if bounds is world.bounds:
@@ -270,15 +278,18 @@ def pointing_problem(
     ModelError
         The ray of the arm sweeps no more than a surface; only where goals are to be found.
     RrthError
-        A q_start that is no (dof,) finite numbers; no goal that is free.
+        A q_start that is no (dof,) finite numbers, an argument of another type; no goal that is
+        free.
 
     """
+    _check_types(arm, goal, world)
     q_start = float_array(q_start, (arm.dof,), 'q_start', 'rad')
     if goals is None:
         check_pointing_arm(arm)
         goals = goal_configurations(arm, goal, world, q_start, FEW)
         if len(goals.q_goals) == 0:
             goals = goal_configurations(arm, goal, world, q_start, MANY)
+    check_type(goals, GoalSet, 'goals')
     bounds = turns_near(arm, world.bounds, q_start, 2.0)
     if bounds is not world.bounds and len(goals.q_goals) > 0:
         low, high = goals.q_goals.min(axis=0), goals.q_goals.max(axis=0)
@@ -292,6 +303,12 @@ def pointing_problem(
         slide_goal=pointing_kernels(arm).slide_goal,
         target=target_in_mount(arm, goal),
     )
+
+
+def _check_types(arm: ArmModel, goal: PointingGoal, world: World) -> None:
+    check_type(arm, ArmModel, 'arm')
+    check_type(goal, PointingGoal, 'goal')
+    check_type(world, World, 'world')
 
 
 @functools.lru_cache(maxsize=32)

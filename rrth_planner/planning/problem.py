@@ -10,7 +10,7 @@ from rrth_planner.collision.world import World
 from rrth_planner.kernels import jit
 from rrth_planner.kernels.search import tree
 from rrth_planner.model.arrays import Array, frozen_array
-from rrth_planner.model.errors import RrthError
+from rrth_planner.model.errors import check_type, RrthError
 from rrth_planner.model.frozen import Frozen
 
 NOWHERE = frozen_array(np.zeros(3), (3,), 'target', 'm', RrthError)
@@ -47,6 +47,7 @@ class PlanningProblem(Frozen):
 
     def __post_init__(self) -> None:
         """Validate and freeze."""
+        check_type(self.world, World, 'world')
         dof = self.world.bounds.shape[1]
         for name, shape, unit in (
             ('q_start', (dof,), 'rad'),

@@ -7,9 +7,9 @@ from collections import deque
 import numpy as np
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import OptionsError
-from rrth_planner.model.trajectory import MotionState
 from rrth_planner.simulation.trajectory_controller import (
     ControllerRules,
+    ControllerState,
     DEFAULT_RULES,
     TimedPoints,
     TrajectoryController,
@@ -48,7 +48,7 @@ class LaggingArm:
         """Have the controller take a message before its next cycle; stamp [s], 0: at once."""
         self.controller.receive(points, stamp)
 
-    def step(self) -> MotionState:
+    def step(self) -> ControllerState:
         """Run the cycle that is due, and let its period pass; return the setpoint, due then."""
         setpoint = self.controller.update(self.time, self.measured)
         self._n_steps += 1
@@ -57,11 +57,11 @@ class LaggingArm:
         return setpoint
 
     @property
-    def measured(self) -> MotionState:
+    def measured(self) -> ControllerState:
         """What encoders read now."""
         return self.measured_at(self.time)
 
-    def measured_at(self, time: float) -> MotionState:
+    def measured_at(self, time: float) -> ControllerState:
         """
         Return what encoders read at a time between the last two cycles [s].
 
@@ -74,4 +74,4 @@ class LaggingArm:
         if k + 1 < len(times) and then > times[k]:
             share = (then - times[k]) / (times[k + 1] - times[k])
             q, v = (1.0 - share) * self._setpoints[k][1] + share * self._setpoints[k + 1][1]
-        return MotionState(positions=q, velocities=v, accelerations=np.full_like(q, np.nan))
+        return ControllerState(positions=q, velocities=v, accelerations=np.full_like(q, np.nan))

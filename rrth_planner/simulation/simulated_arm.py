@@ -10,7 +10,6 @@ import numpy as np
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import OptionsError
-from rrth_planner.model.trajectory import MotionState
 from rrth_planner.simulation.arm_dynamics import ArmDynamics
 from rrth_planner.simulation.body_shapes import capsules_within
 from rrth_planner.simulation.contacts import ContactEvent, contacts_of, followed
@@ -22,6 +21,7 @@ from rrth_planner.simulation.trajectory_controller import (
     Command,
     commanded_state,
     ControllerRules,
+    ControllerState,
     DEFAULT_RULES,
     TimedPoints,
     TrajectoryController,
@@ -85,7 +85,7 @@ class ArmReading:
         As the encoders have them [rad, rad/s].
     efforts : ndarray
         Of the motors [N m].
-    wanted : MotionState
+    wanted : ControllerState
         What the controller commands for this time.
     true_positions, true_velocities : ndarray
         Without noise.
@@ -96,7 +96,7 @@ class ArmReading:
     positions: Array
     velocities: Array
     efforts: Array
-    wanted: MotionState
+    wanted: ControllerState
     true_positions: Array
 
 
@@ -180,7 +180,7 @@ class SimulatedArm:
         stretch(self.physics, data.qpos)
         self._wanted = self._controller.update(
             self.time,
-            MotionState(
+            ControllerState(
                 positions=self._positions,
                 velocities=self._velocities,
                 accelerations=np.full(self.arm.dof, np.nan),

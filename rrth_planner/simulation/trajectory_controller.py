@@ -18,7 +18,7 @@ import functools
 import numpy as np
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import MessageError, OptionsError
-from rrth_planner.model.trajectory import MotionState, sample, Trajectory
+from rrth_planner.model.trajectory import sample, Trajectory
 
 
 class ControllerVersion(Enum):
@@ -38,6 +38,19 @@ class ControllerVersion(Enum):
     def defers(self) -> bool:
         """Whether a message with a stamp ahead waits until then."""
         return self in (ControllerVersion.V6_9, ControllerVersion.BLENDING)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ControllerState:
+    """
+    What is commanded or measured of the joints, (dof,) [rad, rad/s, rad/s^2].
+
+    Accelerations that are not measured are NaN: no state that a motion may begin with.
+    """
+
+    positions: Array
+    velocities: Array
+    accelerations: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -94,7 +107,7 @@ class Command:
         When its time is 0 [s].
     begin : float
         To which time the state before belongs, as the controller has it [s].
-    before : MotionState or None
+    before : ControllerState or None
         The state from which the arm is led to the first point, where that is due later; NaN where
         unknown.
 
@@ -103,7 +116,7 @@ class Command:
     points: TimedPoints
     start_time: float
     begin: float = 0.0
-    before: MotionState | None = None
+    before: ControllerState | None = None
     is_holding: bool = False
 
     @property
@@ -160,7 +173,7 @@ def replace_command(
     points: TimedPoints,
     stamp: float,
     now: float,
-    before: MotionState,
+    before: ControllerState,
     begin: float | None = None,
 ) -> Command:
     """
@@ -170,7 +183,7 @@ def replace_command(
     ----------
     stamp : float
         When the trajectory starts [s]; 0: now.
-    before : MotionState
+    before : ControllerState
         From where the arm is led to the first point if that is due later: what was commanded, or
         what is measured.
     begin : float, optional
@@ -185,7 +198,7 @@ def replace_command(
     )
 
 
-def ramp_to_rest(present: MotionState, deceleration: Array, now: float) -> Command:
+def ramp_to_rest(present: ControllerState, deceleration: Array, now: float) -> Command:
     """Return what takes each joint to rest at a constant deceleration, (dof,) [rad/s^2]."""
     v = present.velocities
     durations = np.abs(v) / deceleration
@@ -203,7 +216,7 @@ def ramp_to_rest(present: MotionState, deceleration: Array, now: float) -> Comma
     return Command(points=points, start_time=now, is_holding=True)
 
 
-def commanded_state(command: Command, time: float) -> MotionState:
+def commanded_state(command: Command, time: float) -> ControllerState:
     """Return what is commanded at a time [s], (dof,) each."""
     points = command.points
     since = time - command.start_time
@@ -216,7 +229,7 @@ def commanded_state(command: Command, time: float) -> MotionState:
         return _state(_piece(points, i), since - points.times[i])
     last = (points.velocities[i], points.accelerations[i])
     velocity, acceleration = (np.where(np.isnan(row), 0.0, row) for row in last)
-    return MotionState(
+    return ControllerState(
         positions=points.positions[i], velocities=velocity, accelerations=acceleration
     )
 
@@ -254,9 +267,9 @@ def deviation(
     return i, f'{abs(error[i]):.4g} from what is commanded, expected {what} {allowed[i]:g} [rad]'
 
 
-def _state(piece: Trajectory, time: float) -> MotionState:
+def _state(piece: Trajectory, time: float) -> ControllerState:
     q, v, a = sample(piece, [time])
-    return MotionState(positions=q[0], velocities=v[0], accelerations=a[0])
+    return ControllerState(positions=q[0], velocities=v[0], accelerations=a[0])
 
 
 # A stretch of a motion comes with every body: of the one before it nothing is asked any more.
@@ -350,7 +363,7 @@ class TrajectoryController:
         # Why the last cycle gave its trajectory up, if it did: which joint, and a sentence.
         self.given_up: tuple[int, str] | None = None
         # The last setpoint, and the time of the cycle that found it [s].
-        self._last: tuple[MotionState, float] | None = None
+        self._last: tuple[ControllerState, float] | None = None
         # The newest message that is not executed yet: points and stamp [s].
         self._message: tuple[TimedPoints, float] | None = None
         # Whether a cycle has left it to wait for its stamp.
@@ -360,7 +373,7 @@ class TrajectoryController:
         """Take a message that starts at a time [s], 0: at once; one that still waits is lost."""
         self._message, self._is_waiting = (points, stamp), False
 
-    def update(self, now: float, measured: MotionState) -> MotionState:
+    def update(self, now: float, measured: ControllerState) -> ControllerState:
         """
         Return what is commanded in the cycle at a time [s], which is the state a period later.
 
@@ -378,7 +391,7 @@ class TrajectoryController:
         self._last = setpoint, now
         return setpoint
 
-    def cancel(self, now: float, measured: MotionState) -> None:
+    def cancel(self, now: float, measured: ControllerState) -> None:
         """Give the trajectory up: hold the *measured* position, or slow down from there."""
         deceleration = self.rules.deceleration
         self.command = (
@@ -387,7 +400,7 @@ class TrajectoryController:
             else ramp_to_rest(measured, deceleration, now)
         )
 
-    def _take_message(self, now: float, measured: MotionState) -> None:
+    def _take_message(self, now: float, measured: ControllerState) -> None:
         if self._message is None:
             return
         (points, stamp), version = self._message, self.rules.version

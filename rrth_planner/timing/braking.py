@@ -6,6 +6,7 @@ import numpy as np
 from rrth_planner.collision.certificate import Certificate, certify
 from rrth_planner.collision.world import World
 from rrth_planner.model.arrays import check_dof, float_number
+from rrth_planner.model.errors import check_type
 from rrth_planner.model.trajectory import MotionLimits, part_of, sample, Trajectory
 from rrth_planner.timing.fast_stop import fast_stop
 
@@ -29,6 +30,8 @@ def brake(trajectory: Trajectory, time: float, limits: MotionLimits) -> Trajecto
         A time that is no number, or limits of another number of joints.
 
     """
+    check_type(trajectory, Trajectory, 'trajectory')
+    check_type(limits, MotionLimits, 'limits')
     time = float_number(time, 'time', 's')
     check_dof(trajectory.positions, len(limits.velocity), 'trajectory')
     if not 0.0 < time < trajectory.duration:

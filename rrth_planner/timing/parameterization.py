@@ -5,7 +5,7 @@
 import numpy as np
 from rrth_planner.kernels.trajectory import quintics, timed_path
 from rrth_planner.model.arrays import Array, check_dof, float_number
-from rrth_planner.model.errors import RrthError
+from rrth_planner.model.errors import check_type, RrthError
 from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import MotionLimits, piece_coefficients, Trajectory
 from rrth_planner.timing.corner_blends import Blend
@@ -58,10 +58,15 @@ def parameterize(
         Blends for another number of corners, or limits for another number of joints.
 
     """
+    check_type(path, Path, 'path')
+    check_type(limits, MotionLimits, 'limits')
     q = path.waypoints
     check_dof(q, len(limits.velocity), 'path')
     v_start = float_number(v_start, 'v_start', 'rad/s', 0.0)
     n_corners = max(0, len(q) - 2)
+    blends = tuple(blends) if isinstance(blends, (list, tuple)) else (blends,)
+    for blend in blends:
+        check_type(blend, Blend, 'blends')
     if len(blends) != n_corners:
         raise RrthError(f'blends: {len(blends)}, expected one for each of {n_corners} corners')
     if path.length < STILL:

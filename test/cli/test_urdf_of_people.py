@@ -17,13 +17,13 @@ pytest.importorskip('fcl')
 
 from rrth_planner.cli import plan, read_urdf
 from rrth_planner.collision.world import arm_world
-from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.arm_file import arm_to_yaml, load_arm
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.settings import load_settings
 from rrth_planner.io.urdf.chain import read_chain
 from rrth_planner.io.urdf.placed_robot import place_robot
 from rrth_planner.io.wearer_file import load_body
-from rrth_planner.model.arm import forward_kinematics, tool_pose
+from rrth_planner.model.arm import ArmModel, Capsule, forward_kinematics, tool_pose
 from rrth_planner.model.rotation import pose_matrix, rotation_matrix
 
 BEHIND = ['--mount', '-0.3', '0', '0.3', '0', '0', '0', '1']
@@ -467,3 +467,34 @@ def test_the_example_is_read_as_before(tmp_path):
     ours, packaged = load_arm(arm), load_arm(resource_path('config/examples/chest_arm.yaml'))
     assert np.array_equal(ours.dh, packaged.dh)
     assert np.abs(ours.T_base_mount - packaged.T_base_mount).max() < 1e-12
+
+
+def sliding_arm(tmp_path, longest):
+    """Return the file of an arm whose hand slides out of its shoulder, clear beyond 0.4 m."""
+    ball, quarter = np.array([[0.0, 0.0, -0.01], [0.0, 0.0, 0.01]]), 0.5 * np.pi
+    arm = ArmModel(
+        joint_names=('turn', 'tilt', 'slide'),
+        is_prismatic=(False, False, True),
+        dh=np.array([[0.0] * 4, [-quarter, 0, 0, 0], [quarter, 0, 0, 0], [0.0] * 4]),
+        bounds=np.array([[-2.0, -2.0, 0.0], [2.0, 2.0, longest]]),
+        radii=np.zeros(4),
+        T_base_mount=np.eye(4),
+        capsules=tuple(
+            Capsule(name=name, link=link, ends=ball, radius=radius)
+            for name, link, radius in (('shoulder', 1, 0.19), ('fork', 2, 0.01), ('hand', 3, 0.19))
+        ),
+    )
+    file = tmp_path / 'arm.yaml'
+    file.write_text(arm_to_yaml(arm, 'arm'))
+    return file
+
+
+def test_an_arm_that_is_mostly_in_its_own_way_is_told_where_some_is_free(tmp_path, capsys):
+    asked = ['--arm', str(sliding_arm(tmp_path, 0.43)), '--start', 'auto']
+    asked += ['--target', '-1.2', '0.1', '2.5']
+    assert plan.main(asked) == 2
+    said = capsys.readouterr().err
+    assert 'plan: give --mount X Y Z QX QY QZ QW, where ' in said
+    assert '% are free, such as ' in said
+    place = said.split('such as ')[1].split(':')[0].split()
+    assert plan.main([*asked, *place]) == 0

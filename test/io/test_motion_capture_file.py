@@ -102,6 +102,15 @@ def test_an_upper_body_is_told_by_the_span_of_its_arms(tmp_path):
     assert said[0].endswith('the skeleton is 0.60 m tall, and 1.30 m from end to end')
 
 
+def test_a_spine_alone_is_as_tall_as_it_is_long(tmp_path):
+    pytest.importorskip('pybvh')
+    said = []
+    chain(tmp_path, ('OFFSET 0 60 0', 'OFFSET 0 80 0'))
+    load_person(tmp_path / 'chain.bvh', say=said.append)
+    assert said[0].endswith('m tall')
+    assert ' 0.00 m' not in said[0]
+
+
 CHAIN = """HIERARCHY
 ROOT Hips
 {

@@ -90,15 +90,6 @@ WHOLE_FORMS = {
     'whole numbers': lambda q: q.astype(int),
     'list of whole numbers': lambda q: q.astype(int).tolist(),
     'int8': lambda q: q.astype(np.int8),
-    'uint16': lambda q: q.astype(np.uint16),
-}
-
-
-# Forms of whole numbers only.
-WHOLE_FORMS = {
-    'whole numbers': lambda q: q.astype(int),
-    'list of whole numbers': lambda q: q.astype(int).tolist(),
-    'int8': lambda q: q.astype(np.int8),
 }
 NO_ARRAYS = {
     'another length': lambda q: np.append(q, q, axis=-1)[..., :-1],
@@ -234,6 +225,64 @@ CALLS = {
     'BoxMap start': (Q0, lambda q: replace(MAP, start=q)),
     'BoxMap goal': (Q0, lambda q: replace(MAP, goal=q)),
 }
+PATH = rrth.Path([Q, WHOLE])
+PROBLEM = rrth.PlanningProblem(world=world, q_start=Q, q_goals=[Q])
+# Public functions and their arguments, which are values of this package or of numpy.
+FUNCTIONS = {
+    rrth.forward_kinematics: {'arm': ARM, 'q': Q},
+    rrth.tool_pose: {'arm': ARM, 'q': Q},
+    rrth.arm_world: {'arm': ARM, 'scene': wearer(), 'margin': 0.02, 'ray_guard_length': 1.0},
+    rrth.goal_configurations: {
+        'arm': ARM,
+        'goal': GOAL,
+        'world': world,
+        'q_near': Q,
+        'n_draws': 64,
+    },
+    rrth.pointing_problem: {'arm': ARM, 'goal': GOAL, 'world': world, 'q_start': Q, 'goals': None},
+    rrth.map_world: {'box_map': MAP},
+    rrth.map_problem: {'box_map': MAP, 'world': None},
+    rrth.PlanningProblem: {'world': world, 'q_start': Q, 'q_goals': [Q]},
+    rrth.plan: {
+        'problem': PROBLEM,
+        'options': OPTIONS,
+        'rng': np.random.default_rng(1),
+        'should_stop': lambda: True,
+        'previous': None,
+    },
+    rrth.plan_motion: {
+        'arm': ARM,
+        'scene': wearer(),
+        'q_start': FOLDED,
+        'goal': GOAL,
+        'limits': LIMITS,
+        'options': OPTIONS,
+        'margin': 0.02,
+        'ray_guard_length': 1.0,
+        'seed': 1,
+        'should_stop': lambda: True,
+        'moving': None,
+        'escape_depth': 0.05,
+        'reserve': 0.0,
+        'second_checker': 'fcl',
+        'rules': None,
+        'stop_limits': None,
+        'body_age': 0.0,
+    },
+    rrth.warm_up: {'arm': ARM, 'options': OPTIONS, 'second_checker': 'fcl'},
+    rrth.parameterize: {'path': PATH, 'blends': (), 'limits': LIMITS, 'v_start': 0.0},
+    rrth.sample: {'trajectory': motion, 'times': 0.5},
+    rrth.brake: {'trajectory': motion, 'time': 0.5, 'limits': LIMITS},
+    rrth.certify: {'trajectory': motion, 'world': world, 'begin': 0.0},
+    rrth.certify_braking: {
+        'trajectory': motion,
+        'time': 0.5,
+        'world': world,
+        'limits': LIMITS,
+    },
+}
+# What people give in place of a value: its numbers, its name, a seed, or another value.
+NO_VALUES = (None, 'home', 3, [1.5, 0.1, 0.3], {'target': [1.5, 0.1, 0.3]}, rrth.PlanStatus.SOLVED)
 # What such arguments are called that are made by other functions only, or that say no more.
 MADE = {
     'World': {'bounds', 'robot', 'obstacles', 'lanes', 'functions', 'space'},
@@ -298,6 +347,38 @@ def test_what_is_given_is_neither_changed_nor_kept(name):
     given[...] = 77.0
     assert not before
     assert not [*differences(answer, call(array))]
+
+
+@pytest.mark.parametrize('function', FUNCTIONS, ids=lambda f: f.__name__)
+def test_what_is_no_value_of_its_class_is_said_in_one_sentence(function):
+    """Numbers of another type are left to the tests above."""
+    arguments = FUNCTIONS[function]
+    function(**arguments)
+    for name, given in arguments.items():
+        if isinstance(given, (np.ndarray, list)) or name == 'times':
+            continue
+        for value in NO_VALUES:
+            is_number = isinstance(given, (int, float)) and value == 3
+            is_left_out = given is None and value is None
+            if is_number or is_left_out:
+                continue
+            sentence = said(name, lambda v, name=name: function(**{**arguments, name: v}), value)
+            assert sentence.startswith(f'{name}: '), sentence
+
+
+def test_every_public_function_that_computes_is_among_them():
+    computing = {
+        value
+        for name in rrth.__all__
+        if inspect.isfunction(value := getattr(rrth, name))
+        and not name.startswith('load_')
+        and not name.endswith('_from_mapping')
+    }
+    assert computing <= set(FUNCTIONS)
+
+
+def test_numbers_in_place_of_boxes_are_said_in_one_sentence():
+    assert said('boxes', rrth.Scene, [[0.0, 0.0, 1.0]]).startswith('boxes: ')
 
 
 def test_every_public_argument_that_is_an_array_is_among_them():

@@ -4,6 +4,7 @@
 
 import numpy as np
 import pytest
+from recordings import write_child
 
 pytest.importorskip('rclpy')
 pytest.importorskip('mujoco')
@@ -17,7 +18,7 @@ from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.io.resources import resource_path  # noqa: E402
 from rrth_planner.io.text_file import load_yaml  # noqa: E402
 from rrth_planner.model.arm import tool_pose  # noqa: E402
-from rrth_planner.model.errors import MessageError  # noqa: E402
+from rrth_planner.model.errors import MessageError, SceneError  # noqa: E402
 from rrth_planner.model.trajectory import Trajectory  # noqa: E402
 from rrth_planner.ros.interface.simulation_parameters import SETTINGS  # noqa: E402
 from rrth_planner.ros.messages.controller_points import controller_points_from_msg  # noqa: E402
@@ -196,6 +197,13 @@ def test_an_arm_that_runs_into_the_wearer_reports_that(started, tmp_path):
             for s in msg.status
         )
     )
+
+
+def test_a_recorded_child_is_in_the_scene_where_the_stature_says_so(started, tmp_path):
+    file = str(write_child(tmp_path / 'child.csv'))
+    with pytest.raises(SceneError, match='smaller than the parameter stature says'):
+        started(wearer='recorded', wearer_file=file)
+    started(wearer='recorded', wearer_file=file, stature=[1.2])
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Planner and playback as processes, with a joint that turns without a stop, and drivers of it."""
 
+import json
 import re
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -137,3 +140,47 @@ def test_every_motion_begins_at_the_reading_and_ends_on_the_target(
     # Of no motion was the turn another one; what an arm that missed a motion rejects is near.
     found = re.findall(r'begins at position (\S+), the arm is at (\S+),', '\n'.join(said))
     assert all(abs(float(one) - float(other)) < np.pi for one, other in found), said
+
+
+def test_point_at_follows_an_arm_whose_driver_wraps(tmp_path, wait_until, send, spinning):
+    pytest.importorskip('tqdm')
+    file = tmp_path / 'arm.yaml'
+    file.write_text(arm_to_yaml(ARM, 'arm'))
+    driver, said = Driver(), []
+    driver.wraps = True
+    ros = ['--ros-args', '-p', f'arm:={file}', '-p']
+    playback = [*ros, 'initial_positions:=[3.0, 0.0]', '-r', 'joint_states:=true_states']
+
+    def point_at(angle, *options):
+        """Return what the command reports of a target in a direction [rad]."""
+        target = [f'{x:.9f}' for x in (2.0 * np.cos(angle), 2.0 * np.sin(angle), 0.3)]
+        command = [sys.executable, '-m', 'rrth_planner.cli.point_at', '--json', *options]
+        ended = subprocess.run(
+            [*command, '--', *target], capture_output=True, text=True, timeout=280.0
+        )
+        report = json.loads(ended.stdout)
+        assert ended.returncode == 0, (report, ended.stderr, said)
+        assert report['pointing_error'] < 1e-3
+        return report
+
+    with (
+        ChildProcess(
+            'rrth_planner.ros.planner_node',
+            [*ros, 'seed:=3', '-p', 'separation:=false'],
+            said.append,
+        ),
+        ChildProcess('rrth_planner.ros.playback_node', playback, said.append),
+        spinning(driver),
+    ):
+        wait_until(driver.plan.service_is_ready, 240.0)
+        wait_until(lambda: driver.states)
+        send(driver, driver.body, samples.array(samples.box('far', center=[0.0, 0.0, -5.0])))
+        # Across half a turn, on through the next one, and back.
+        for pan in (4.0, 6.5, 9.0, 7.0):
+            assert point_at(pan)['arrived'] is True
+            assert driver.states[-1].position[0] == pytest.approx(pan, abs=1e-3)
+            assert abs(driver.states[-1].position[1]) < 1.0
+        # Where it is reported it would not move a joint by a turn either.
+        assert point_at(8.0, '--no-move')['figures']['duration'] < 3.0
+        assert driver.states[-1].position[0] == pytest.approx(7.0, abs=1e-3)
+    driver.destroy_node()

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rrth_planner.model.errors import MessageError, OptionsError
-from rrth_planner.model.trajectory import MotionState, Trajectory
+from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.simulation.trajectory_controller import (
     commanded_state,
+    ControllerState,
     deviation,
     hold,
     is_moving,
@@ -24,7 +25,9 @@ N, DOF = 5, 3
 TIMES = np.array([0.0, 0.3, 0.7, 0.8, 1.4])
 P, V, A = RNG.normal(size=(3, N, DOF))
 NO = np.full((N, DOF), np.nan)
-AT = MotionState(positions=np.ones(DOF), velocities=np.full(DOF, 0.5), accelerations=np.zeros(DOF))
+AT = ControllerState(
+    positions=np.ones(DOF), velocities=np.full(DOF, 0.5), accelerations=np.zeros(DOF)
+)
 
 
 def points(velocities=V, accelerations=A, times=TIMES):

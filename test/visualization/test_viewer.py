@@ -9,6 +9,7 @@ from urllib.request import urlopen
 
 import numpy as np
 import pytest
+from recordings import write_child
 
 pytest.importorskip('fcl')
 pytest.importorskip('viser')
@@ -300,6 +301,23 @@ def test_the_urdf_of_another_arm_is_one_sentence(capsys):
     said = capsys.readouterr().err
     assert 'no joint "joint_1", expected those of the arm' in said
     assert said.count('\n') == 1
+
+
+def test_a_child_is_a_wearer_where_the_stature_says_so(tmp_path, capsys):
+    person = ['--person', str(write_child(tmp_path / 'child.csv')), '--no-open']
+    nowhere = ['--host', 'no.such.host.invalid']
+    for arguments, words in (
+        ([], 'smaller than the parameter stature says'),
+        (['--stature', '0.2'], 'stature: [0.2, 0.2], expected that of the smallest'),
+        (['--stature', '0.9', '1.0', '1.1'], 'stature: 3 values, expected one or two [m]'),
+        # He is taken: only the address is none.
+        (['--stature', '1.0', '1.2'], '--host no.such.host.invalid'),
+        (['--stature', '1.2'], '--host no.such.host.invalid'),
+    ):
+        assert main([*person, *nowhere, *arguments]) == 1
+        said = capsys.readouterr().err
+        assert words in said
+        assert len([line for line in said.splitlines() if words in line]) == 1
 
 
 @pytest.fixture(name='person_page')

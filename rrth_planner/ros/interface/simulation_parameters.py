@@ -34,7 +34,7 @@ from rrth_planner.simulation.trajectory_controller import (
 from rrth_planner.simulation.urdf_inertia import urdf_inertias
 from rrth_planner.wearer.body_boxes import body_boxes
 from rrth_planner.wearer.recorded_person import excerpt, posture_at, RecordedPerson
-from rrth_planner.wearer.skeleton import Skeleton
+from rrth_planner.wearer.skeleton import Skeleton, STATURES
 
 NOBODY, STANDING, RECORDED = 'none', 'standing', 'recorded'
 *_FIRST, _LAST = (version.value for version in ControllerVersion)
@@ -86,6 +86,7 @@ SETTINGS = (
         'boxes of one who stands, or a recording; empty: the packaged one',
     ),
     _fixed('skeleton', 'cmu_bvh', 'name or path', 'what makes boxes of a recording'),
+    _fixed('stature', list(STATURES), 'm', 'of the smallest and the largest one', 0.5, 2.8),
     _fixed(
         'wearer_unit',
         '',
@@ -144,7 +145,7 @@ def simulated_wearer(node: Node) -> SimulatedWearer | None:
         value['wearer_begin'],
         value['wearer_end'] or None,
     )
-    skeleton = load_skeleton(value['skeleton'])
+    skeleton = load_skeleton(value['skeleton'], value['stature'])
     return SimulatedWearer(recorded_body(person, skeleton), person, skeleton)
 
 

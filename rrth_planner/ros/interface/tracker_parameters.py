@@ -95,10 +95,7 @@ def declare_tracker_parameters(node: Node) -> TrackerParameters:
         raise OptionsError('base_frame: empty, expected the name of the frame of the boxes')
     if NAME not in values['pose_topic']:
         raise OptionsError(f'pose_topic: "{values["pose_topic"]}", expected a name with {NAME}')
-    stature = values.pop('stature')
-    if len(stature) not in (1, 2):
-        raise OptionsError(f'stature: {len(stature)} values, expected one or two [m]')
-    skeleton = load_skeleton(values['skeleton'], (stature[0], stature[-1]))
+    skeleton = load_skeleton(values['skeleton'], values.pop('stature'))
     person = values['person']
     is_number = type(person) is int and ONLY <= person <= MOST_PERSON
     if not is_number and person != NEAREST:
