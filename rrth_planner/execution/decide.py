@@ -1,7 +1,7 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
 """
-What the guard of a moving arm does: from what it knows and what happens to what follows.
+What the monitor of a moving arm does: from what it knows and what happens to what follows.
 
 Each new body is checked against the remaining motion, since the wearer moves too; each tick checks
 the inputs, and whether the arm does what it is commanded. Time is a field of events. A command is

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the guard decides about: each event with its time, and with what was known then."""
+"""What the monitor decides about: each event with its time, and with what was known then."""
 
 from dataclasses import dataclass
 

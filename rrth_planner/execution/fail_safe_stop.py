@@ -35,6 +35,7 @@ from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import part_of
 
 NOT_STOPPED = 'arm did not follow the commanded stop'
+STOPPED_AGAIN = 'arm did not follow the commanded stop: stop published again'
 
 
 def stop_of(watch: Watch, at: Moment, running: ExecutingMotion, phase: float) -> ExecutingMotion:
@@ -193,7 +194,7 @@ def repeated_stop(watch: Watch, at: Moment) -> Decision:
     is_withheld, lines = _is_withheld(watch, stop, before, at.now)
     if is_withheld:
         return Decision(watch=watch, lines=lines)
-    line = Line(Level.ERROR, f'{NOT_STOPPED}: stop published again')
+    line = Line(Level.ERROR, STOPPED_AGAIN)
     watch = replace(watch, tracked=track_stop_again(watch.tracked, stop))
     return Decision(
         watch=doubted(watch, Level.ERROR, NOT_STOPPED),

@@ -1,7 +1,7 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
 """
-The last events that the guard decided about, to be decided again: the same to the bit.
+The last events that the monitor decided about, to be decided again: the same to the bit.
 
 Scenes are kept as names and numbers: those of half a minute beside a tracker are many. Rules,
 which are large and hardly ever change, are written once.

@@ -175,7 +175,7 @@ class PendingStop:
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Watch:
     """
-    The guard's memory; `decide.decide` says what follows it.
+    The memory of the monitor; `decide.decide` says what follows it.
 
     Parameters
     ----------

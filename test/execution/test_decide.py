@@ -5,7 +5,7 @@
 from dataclasses import fields, is_dataclass, replace
 import re
 
-from guarded import (
+from decisions import (
     at_later,
     BEGIN,
     begun,
@@ -214,7 +214,7 @@ def test_the_same_watch_and_event_give_the_same_decision(name):
                 assert one.command.begin == other.command.begin
 
 
-def test_all_that_the_guard_knows_and_hears_is_frozen():
+def test_all_that_the_monitor_knows_and_hears_is_frozen():
     kinds = [Watch, events.Moment, *events.Event.__subclasses__(), events.Sight, events.Look]
     for kind in kinds:
         assert is_dataclass(kind)

@@ -29,6 +29,7 @@ MAY = {
     'wearer': 'model',
     'io': 'model collision planning pipeline wearer',
     'simulation': 'model wearer io',
+    'rehearsal': 'model collision timing execution pipeline wearer io simulation',
     'visualization': 'model collision planning execution pipeline wearer io',
     'ros': 'kernels model collision planning timing execution pipeline wearer io simulation',
     'reproduction': 'kernels model collision planning io visualization',

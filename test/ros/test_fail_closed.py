@@ -17,7 +17,7 @@ from rclpy.node import Node  # noqa: E402
 import rrth_planner  # noqa: E402
 from rrth_planner.execution import (  # noqa: E402
     commitments,
-    decide as guard,
+    decide as decisions,
     fail_safe_stop,
     tracked_motion,
 )
@@ -160,7 +160,7 @@ def places():
     """Return what the monitor calls, as (owner, name)."""
     found = [
         (module, name)
-        for module in (execution_monitor, guard, fail_safe_stop, commitments, tracked_motion)
+        for module in (execution_monitor, decisions, fail_safe_stop, commitments, tracked_motion)
         for name, value in vars(module).items()
         if isinstance(value, FunctionType)
         and value.__module__.startswith(('rrth_planner.execution', 'rrth_planner.ros.messages'))
@@ -268,7 +268,7 @@ def test_after_an_error_nothing_is_planned_by_itself(
     arm.reporter.parameters = replace(arm.reporter.parameters, replan=replan)
     arm.late = late
     if not late:
-        monkeypatch.setattr(guard, 'is_remaining_free', lambda *_, **__: 1 / 0)
+        monkeypatch.setattr(decisions, 'is_remaining_free', lambda *_, **__: 1 / 0)
     arm.see(FAR)
     assert len(arm.published) == 1
     (stop,) = arm.monitor.take_stops()

@@ -1,7 +1,7 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
 """
-The guard in the node: messages and clocks become events, decisions become messages.
+The monitor in the node: messages and clocks become events, decisions become messages.
 
 It fails closed: any error ends in a fail-safe stop by what was known before it.
 """

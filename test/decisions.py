@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""A guarded arm without ROS and without a clock: what tests of decisions begin with."""
+"""A monitored arm without ROS and without a clock: what tests of decisions begin with."""
 
 from dataclasses import dataclass, replace
 

@@ -1,0 +1,261 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A wearer, his tracker, the monitor, a controller and a lagging arm in virtual time.
+
+What goes wrong on a real wire is drawn with a seed: frames that are late or lost, messages that
+take their time, a host that stands still, a middleware that fails, a controller that rejects.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+import math
+from typing import Protocol
+
+import numpy as np
+from rrth_planner.execution.decision import Command
+from rrth_planner.execution.event import BodyCame, Event, Look, Moment, Sight, Tick
+from rrth_planner.execution.expected_wearer import expected_scene
+from rrth_planner.execution.joint_reading import JointReading, with_earlier
+from rrth_planner.execution.watch import MonitorRules
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.scene import Box, Scene
+from rrth_planner.rehearsal.timeline import Timeline
+from rrth_planner.rehearsal.virtual_monitor import VirtualMonitor
+from rrth_planner.simulation.lagging_arm import LaggingArm
+from rrth_planner.simulation.trajectory_controller import (
+    commanded_state,
+    ControllerRules,
+    ControllerState,
+    DEFAULT_RULES,
+    TimedPoints,
+)
+
+# Periods of joint states and of the monitor's checks [s].
+JOINT_PERIOD, CHECK_PERIOD = 0.01, 0.02
+# Where parts will be is told from two sights that are so far apart [s].
+STEADY, LATELY = 0.08, 0.25
+# Virtual time begins then [s]: stamps are positive.
+BEGIN = 1000.0
+
+
+class Wearer(Protocol):
+    """Somebody who moves."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The parts of him."""
+
+    def rows_at(self, time: float) -> Array:
+        """Return his boxes at a time [s], (m, 15)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wire:
+    """
+    What becomes of frames and messages.
+
+    Parameters
+    ----------
+    frame_period : float
+        Of the tracker [s].
+    age : (float, float)
+        How old a frame is that comes: from, to [s].
+    loss : float
+        The share of frames that never come [-].
+    transport : (float, float)
+        How long a message takes to the controller: from, to [s].
+    deciding : (float, float)
+        How long a decision takes: from, to [s].
+    body_timeout, joint_timeout : float
+        [s].
+
+    """
+
+    frame_period: float = 1 / 60
+    age: tuple[float, float] = (0.01, 0.03)
+    loss: float = 0.0
+    transport: tuple[float, float] = (0.001, 0.005)
+    deciding: tuple[float, float] = (0.0002, 0.0015)
+    body_timeout: float = 0.2
+    joint_timeout: float = 0.2
+
+
+class World:
+    """
+    All of it, from a time at which the arm rests.
+
+    Parameters
+    ----------
+    arm : LaggingArm
+        What executes the commands.
+    monitor : VirtualMonitor
+        What is tried.
+
+    """
+
+    def __init__(
+        self,
+        rules: MonitorRules,
+        wearer: Wearer,
+        q: Array,
+        seed: int,
+        wire: Wire,
+        *,
+        controller: ControllerRules = DEFAULT_RULES,
+        controller_period: float = 0.005,
+        lag: float = 0.0,
+    ) -> None:
+        """Place the arm at rest at q, (dof,) [rad]."""
+        self.rules, self.wearer, self.wire = rules, wearer, wire
+        self.rng = np.random.default_rng(seed)
+        self.timeline = Timeline(BEGIN)
+        self.arm = LaggingArm(q, controller_period, lag, controller, BEGIN)
+        self.monitor = VirtualMonitor(rules, self.moment, self.look, self._send, self._deciding)
+        # Until when the host stands still, the middleware fails, frames are lost and the
+        # controller rejects what it is given [s].
+        self.stands_until = self.fails_until = self.blind_until = self.rejects_until = -math.inf
+        # For those who judge: each cycle's command, and when it is due [s]; where another message
+        # counts from there on, what the one before commands then, too; each message.
+        self.on_setpoint: Callable[[float, ControllerState], None] = lambda time, state: None
+        self.on_join: Callable[[float, ControllerState, ControllerState], None] = lambda *_: None
+        self.on_command: Callable[[Command], None] = lambda command: None
+        self._reading: JointReading | None = None
+        # The newest sight and the last ones, by when they came [s].
+        self._scene, self._measured = Scene(()), -math.inf
+        self._sights: deque[tuple[float, Scene]] = deque(maxlen=64)
+        self._last_arrival = -math.inf
+        # What the controller was given last.
+        self.arrived: Command | None = None
+        # Bodies that came while the host stood still.
+        self._waiting: list[tuple[float, Scene, float]] = []
+        timeline, rng = self.timeline, self.rng
+        timeline.every(controller_period, self._cycle)
+        timeline.every(JOINT_PERIOD, self._read, float(rng.uniform(0.0, JOINT_PERIOD)))
+        timeline.every(CHECK_PERIOD, self._check, float(rng.uniform(0.0, CHECK_PERIOD)))
+        timeline.every(wire.frame_period, self._frame)
+
+    def moment(self) -> Moment:
+        """Return the present, with what the monitor knows."""
+        now, overdue = self.timeline.now, ''
+        if self.monitor.watch.running is not None:
+            age = now - self._measured
+            joints = math.inf if self._reading is None else now - self._reading.taken
+            if joints > self.wire.joint_timeout:
+                overdue = f'joint states are {joints:.3f} s old'
+            elif age > self.wire.body_timeout:
+                overdue = f'the body is {age:.3f} s old'
+        return Moment(
+            now=now, steady=now, reading=self._reading, rules=self.rules, overdue=overdue
+        )
+
+    def look(self) -> Look | None:
+        """Return the wearer, as he was seen last, beside the running motion."""
+        if self.monitor.watch.running is None:
+            return None
+        now = self.timeline.now
+        return Look(self._scene, self._expected(now), now - self._measured)
+
+    @property
+    def is_still(self) -> bool:
+        """Whether the host stands still."""
+        return self.timeline.now < self.stands_until
+
+    @property
+    def scene(self) -> Scene:
+        """The wearer as he was seen last."""
+        return self._scene
+
+    @property
+    def reading(self) -> JointReading | None:
+        """Where the arm was last."""
+        return self._reading
+
+    def take(self, event: Event) -> None:
+        """Have the monitor take an event now."""
+        self.monitor.take(event)
+
+    def _expected(self, now: float) -> Scene:
+        if not self._sights or now - self._sights[-1][0] > LATELY:
+            return Scene(())
+        came, present = self._sights[-1]
+        for then, before in reversed(self._sights):
+            if STEADY <= came - then <= LATELY:
+                return expected_scene(before, present, came - then)
+        return Scene(())
+
+    def _cycle(self) -> None:
+        arm, controller = self.arm, self.arm.controller
+        before, due = controller.command, self.arm.time + controller.period
+        setpoint = arm.step()
+        if controller.command is not before:
+            self.on_join(arm.time, commanded_state(before, due), setpoint)
+        self.on_setpoint(arm.time, setpoint)
+
+    def _read(self) -> None:
+        if self.is_still:
+            return
+        now = self.timeline.now
+        state = self.arm.measured_at(now)
+        recent = with_earlier(state.positions, now, self._reading)
+        self._reading = JointReading(state.positions, state.velocities, now, now, math.inf, recent)
+
+    def _check(self) -> None:
+        if not self.is_still:
+            self._take_waiting()
+            self.monitor.take(Tick(self.moment()))
+
+    def _frame(self) -> None:
+        """Have a frame seen now, which comes later, or never."""
+        now, wire = self.timeline.now, self.wire
+        age, is_lost = float(self.rng.uniform(*wire.age)), self.rng.random() < wire.loss
+        if is_lost or now < self.blind_until:
+            return
+        rows = self.wearer.rows_at(now)
+        rows.setflags(write=False)
+        boxes = zip(self.wearer.names, rows, strict=True)
+        scene = Scene(tuple(Box.of_row(name, row) for name, row in boxes))
+        self.timeline.after(age, lambda: self._body_came(scene, now))
+
+    def _body_came(self, scene: Scene, measured: float) -> None:
+        self._waiting.append((self.timeline.now, scene, measured))
+        if not self.is_still:
+            self._take_waiting()
+
+    def _take_waiting(self) -> None:
+        """Have all bodies seen that came, and the newest one checked."""
+        waiting, self._waiting = self._waiting, []
+        for k, (came, scene, measured) in enumerate(waiting):
+            if measured <= self._measured:
+                # A newer one came before it.
+                continue
+            self._scene, self._measured = scene, measured
+            self._sights.append((self.timeline.now, scene))
+            sight = Sight(scene, np.full(len(scene.boxes), measured))
+            look = self.look() if k == len(waiting) - 1 else None
+            self.monitor.take(BodyCame(self.moment(), sight, look), self.timeline.now - came)
+
+    def _deciding(self) -> float:
+        return float(self.rng.uniform(*self.wire.deciding))
+
+    def _send(self, command: Command) -> None:
+        now = self.timeline.now
+        if now < self.fails_until:
+            raise ConnectionError('no middleware')
+        self.on_command(command)
+        motion = command.motion.trajectory
+        points = TimedPoints(
+            times=motion.times,
+            positions=motion.positions,
+            velocities=motion.velocities,
+            accelerations=motion.accelerations,
+        )
+        arrives = max(now + float(self.rng.uniform(*self.wire.transport)), self._last_arrival)
+        self._last_arrival = arrives
+        self.timeline.at(arrives, lambda: self._arrive(points, command))
+
+    def _arrive(self, points: TimedPoints, command: Command) -> None:
+        if self.timeline.now >= self.rejects_until:
+            self.arrived = command
+            self.arm.receive(points, command.begin)
