@@ -11,7 +11,7 @@ import time
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
-from rrth_planner.cli import plain_parsers
+from rrth_planner.cli.parsers.campaign import parser
 from rrth_planner.cli.program import interrupt_on_signals, INTERRUPTED, run, say
 from rrth_planner.io.extras import require
 from rrth_planner.model.errors import OptionsError, RecordError, RrthError
@@ -28,7 +28,7 @@ MOST, FEWEST = 64, 256
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Plan all queries, print how many have which status, and return the exit code."""
-    options = plain_parsers.campaign().parse_args(arguments)
+    options = parser().parse_args(arguments)
     return run('campaign', lambda: _campaign(options), WRONG)
 
 

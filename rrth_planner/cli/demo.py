@@ -18,7 +18,7 @@ import numpy as np
 import rclpy
 from rclpy.serialization import deserialize_message
 from rclpy.signals import SignalHandlerOptions
-from rrth_planner.cli import ros_parsers
+from rrth_planner.cli.parsers.demo import parser
 from rrth_planner.cli.program import interrupt_on_signals, INTERRUPTED
 from rrth_planner.collision.motion_inspection import inspect_motion
 from rrth_planner.collision.separation_inspection import (
@@ -80,7 +80,7 @@ HEADER = (
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the demo and return the exit code."""
-    options = ros_parsers.demo().parse_args(arguments)
+    options = parser().parse_args(arguments)
     interrupt_on_signals()
     try:
         _run(options)

@@ -10,10 +10,10 @@ import sys
 from typing import TYPE_CHECKING
 
 import numpy as np
-from rrth_planner.cli import plain_parsers
 from rrth_planner.cli.file_question import free_share_of, nothing_free, settings_of
 from rrth_planner.cli.joint_values import joint_values
 from rrth_planner.cli.mount_pose import mount_pose
+from rrth_planner.cli.parsers.read_urdf import parser
 from rrth_planner.cli.program import program, run, say
 from rrth_planner.cli.progress import Progress
 from rrth_planner.io.arm_file import arm_from_mapping, arm_to_mapping, arm_to_yaml
@@ -50,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for k in range(len(given) - 1, 0, -1):
         if given[k - 1] == '--ray' and given[k] in RAYS:
             given[k - 1 : k + 1] = [f'--ray={given[k]}']
-    options = plain_parsers.read_urdf().parse_args(given)
+    options = parser().parse_args(given)
     return run('read_urdf', lambda: _import(options), 2)
 
 

@@ -17,7 +17,7 @@ import numpy as np
 import rclpy
 from rclpy.serialization import deserialize_message
 from rclpy.signals import SignalHandlerOptions
-from rrth_planner.cli import ros_parsers
+from rrth_planner.cli.parsers.simulate import parser
 from rrth_planner.cli.program import interrupt_on_signals, run
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.extras import require
@@ -60,10 +60,10 @@ class _RunOver(Exception):  # noqa: N818
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run until the time is over or a signal; return the exit code."""
-    parser = ros_parsers.simulate()
-    options = parser.parse_args(arguments)
+    command = parser()
+    options = command.parse_args(arguments)
     if options.video and options.seconds == math.inf:
-        parser.error('--video: given without --seconds, expected both')
+        command.error('--video: given without --seconds, expected both')
     if options.viewer is None:
         options.viewer = not options.video
     interrupt_on_signals()
