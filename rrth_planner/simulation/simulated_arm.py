@@ -75,7 +75,7 @@ class Imperfections:
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ArmReading:
     """
-    What is known of the arm after a step, (dof,) each.
+    What is known of the arm after a step; arrays are (dof,) each.
 
     Parameters
     ----------
@@ -87,8 +87,8 @@ class ArmReading:
         Of the motors [N m].
     wanted : MotionState
         What the controller commands for this time.
-    true_positions, true_velocities : ndarray
-        Without noise.
+    true_positions : ndarray
+        Without noise [rad].
 
     """
 
