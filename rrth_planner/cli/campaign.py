@@ -23,7 +23,7 @@ LIBRARIES = ('distributed', 'pyarrow', 'tqdm')
 WRONG = 2
 # Queries in a task: it must take far longer than the millisecond or so that dask spends on one;
 # and tasks of a campaign, where it has so many queries: enough to keep many workers busy.
-MOST, FEWEST = 64, 256
+MOST_QUERIES, FEWEST_TASKS = 64, 256
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -62,7 +62,7 @@ def _campaign(options: argparse.Namespace) -> int:
     done = finished(options.output, schema)
     batches = read_batches(
         options.queries,
-        max(1, min(MOST, n_queries // FEWEST)),
+        max(1, min(MOST_QUERIES, n_queries // FEWEST_TASKS)),
         arm=str(options.arm or ''),
         body=str(options.body or ''),
         seed=None if settings.seed == -1 else settings.seed,

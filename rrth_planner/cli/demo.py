@@ -72,7 +72,7 @@ SIMULATION = 'arm_simulation'
 # late to them [s].
 SERVO_DELAY = 0.02
 # They come to their goals so long after they are slow [s].
-SETTLING = 0.5
+SETTLING_TIME = 0.5
 HEADER = (
     f'{"target":10}{"planning":>12}{"path":>11}{"duration":>11}{"clearance":>12}{"ray error":>12}'
 )
@@ -146,7 +146,7 @@ def _run(options: argparse.Namespace) -> None:
         first.enter_context(planner('false'))
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         stack.callback(rclpy.try_shutdown)
-        rest = (REST_SPEED, SETTLING) if options.physics else (STILL, 0.0)
+        rest = (REST_SPEED, SETTLING_TIME) if options.physics else (STILL, 0.0)
         client = DemoClient(arm, options.timeout, check, *rest)
         stack.callback(client.destroy_node)
         client.wait_for_nodes()

@@ -35,7 +35,7 @@ from rrth_planner.wearer.skeleton import Skeleton
 
 ROS_ARGS = '--ros-args'
 # A picture is taken after so long beside a person [s].
-SHOWN = 4.0
+PICTURE_TIME = 4.0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -121,7 +121,7 @@ def _run_person(
             if options.screenshot is None:
                 page.run()
             else:
-                page.run_for(SHOWN)
+                page.run_for(PICTURE_TIME)
                 save_picture(url, options.screenshot)
         finally:
             page.model.close()
