@@ -346,4 +346,5 @@ def _bars_by_name(arm: ArmModel) -> dict[str, int]:
 def mount_inverse(arm: ArmModel) -> Array:
     """Return the pose of the base frame in that of the arm, (4, 4) [m]."""
     inverse: Array = np.linalg.inv(arm.T_base_mount).astype(np.float64)
+    inverse.setflags(write=False)
     return inverse

@@ -4,13 +4,27 @@
 
 import math
 
+from numba import types
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
 from rrth_planner.kernels import scratch
 from rrth_planner.kernels.collision.arm_validity import BARS_ROOM, curvature_bounds, ENDS_ROOM
 from rrth_planner.kernels.collision.bar_box import bar_box_distance
 from rrth_planner.kernels.collision.boxes import may_meet, rows_of
-from rrth_planner.kernels.jit import CHAIN, CUBE, kernel, MAT, OUT_MAT, OUT_VEC, READ_INTS, VEC
+from rrth_planner.kernels.jit import (
+    ARM,
+    as_chain,
+    BODY,
+    CHAIN,
+    CUBE,
+    kernel,
+    MAT,
+    OUT_MAT,
+    OUT_VEC,
+    POINTS,
+    READ_INTS,
+    VEC,
+)
 from rrth_planner.kernels.layout import (
     BAR_SIZE,
     BOX_HALF,
@@ -37,10 +51,8 @@ STEPS, STEP = 6, 1e-4
 # Smallest velocities that are divided by [rad/s].
 TINY, SLOW = 1e-6, 1e-3
 
-# A wearer as he was seen: boxes (m, 15), allowed (m,) and T_arm_base (4, 4) as for
-# `boxes.rows_of`, by how much each box is grown at time 0 (m,) [m], and its greatest speed (m,)
-# [m/s].
-BODY = (MAT, READ_INTS, MAT, VEC, VEC)
+# Greatest velocities, accelerations and jerks of the joints.
+LIMITS = types.UniTuple(VEC, 3)
 
 
 @kernel(void(MAT, float64, float64, OUT_MAT), is_inner=True)
@@ -174,40 +186,20 @@ def blocking_box(
     return -1
 
 
-@kernel(
-    int64(
-        *(VEC, MAT, MAT, MAT, float64, float64),
-        *(READ_INTS, CHAIN, MAT, *BODY, MAT, MAT, OUT_VEC),
-    ),
-    is_short=True,
-)
-def first_blocked(
-    times,
-    positions,
-    velocities,
-    accelerations,
-    begin,
-    contact,
-    bodies,
-    chain,
-    robot,
-    boxes,
-    allowed,
-    T_arm_base,
-    growths,
-    speeds,
-    quartic,
-    cubic,
-    found,
-):
+@kernel(int64(POINTS, float64, float64, ARM, BODY, MAT, MAT, OUT_VEC), is_short=True)
+def first_blocked(points, begin, contact, arm, body, quartic, cubic, found):
     """
     Return -1 where a motion is proven separate from a moving wearer, else bar * m + box.
 
-    times (n,) [s], positions, velocities and accelerations (n, dof), n > 1: points of the motion,
-    of which only what comes after `begin` counts. The rest: as for `BODY` and `blocking_box`.
-    found (2,): begin and end of the interval that is not proven [s]. Intervals are halved until
-    each is proven; conservative advancement to both sides of their middles.
+    points: `Points` of the motion, of which only what comes after `begin` counts [s]; arm, body:
+    `Arm`, `Body`. The rest as for `blocking_box`. found (2,): begin and end of the interval that
+    is not proven [s]. Intervals are halved until each is proven; conservative advancement to both
+    sides of their middles.
     """
+    times, positions, velocities, accelerations = points
+    address, robot, bodies = arm
+    boxes, allowed, T_arm_base, growths, speeds = body
+    chain = as_chain(address)
     n_pieces, dof = positions.shape[0] - 1, positions.shape[1]
     curves, part = np.empty((n_pieces, 6, dof)), np.empty((6, dof))
     rows = np.empty((BOX_ROWS, boxes.shape[0]))
@@ -349,44 +341,28 @@ def is_rate_safe(rate, place, v, gains, a, j, step, latest, ends, contact, n_bar
 
 
 @kernel(
-    void(
-        *(CUBE, VEC, VEC, int64, float64, VEC, VEC, VEC, VEC, float64),
-        *(READ_INTS, CHAIN, MAT, *BODY, OUT_MAT),
-    ),
+    void(CUBE, VEC, VEC, int64, float64, LIMITS, LIMITS, float64, ARM, BODY, OUT_MAT),
     is_short=True,
 )
 def permitted_rates(
-    curves,
-    times,
-    places,
-    n_rates,
-    reserve,
-    acceleration,
-    jerk,
-    stop_acceleration,
-    stop_jerk,
-    contact,
-    bodies,
-    chain,
-    robot,
-    boxes,
-    allowed,
-    T_arm_base,
-    growths,
-    speeds,
-    found,
+    curves, times, places, n_rates, reserve, limits, stop_limits, contact, arm, body, found
 ):
     """
     Write the greatest rates at some places of a motion from which a stop would keep clear.
 
     curves (n, 6, dof), times (n + 1,): the motion; places (m,): times within it, evenly spread
     [s], of which the first n_rates are asked for; reserve: how many times a rate must be safe, to
-    be permitted; acceleration, jerk, stop_acceleration, stop_jerk
-    (dof,): limits of the motion and of a stop; growths (m,): of the boxes when a stop begins. The
-    rest as for `BODY` and `first_blocked`. found (n_rates, 3): the rate, up to 1, and how fast the
-    rate may change there: its first and its second derivative that the limits of the motion allow
-    [1/s, 1/s^2]. It makes a motion smooth, and proves nothing.
+    be permitted; limits, stop_limits: greatest velocities, accelerations and jerks of the motion
+    and of a stop, (dof,) each; body: `Body`, its growths those when a stop begins. The rest as for
+    `first_blocked`. found (n_rates, 3): the rate, up to 1, and how fast the rate may change there:
+    its first and its second derivative that the limits of the motion allow [1/s, 1/s^2]. It makes
+    a motion smooth, and proves nothing.
     """
+    _, acceleration, jerk = limits
+    _, stop_acceleration, stop_jerk = stop_limits
+    address, robot, bodies = arm
+    boxes, allowed, T_arm_base, growths, speeds = body
+    chain = as_chain(address)
     dof, n_bars, m = curves.shape[2], bodies.shape[0], places.shape[0]
     q, nearby, state = np.empty(dof), np.empty(dof), np.empty((4, dof))
     points, other = scratch.floats(ENDS_ROOM), scratch.floats(ENDS_ROOM)
