@@ -40,14 +40,14 @@ from rrth_planner.kernels.trajectory.quintics import bound, fit
 
 # Intervals that a motion is first cut into are no longer than this [s], and are halved so often
 # before the proof gives up: 0.05 ms.
-FIRST, HALVINGS = 0.0128, 8
+LONGEST_INTERVAL, HALVINGS = 0.0128, 8
 # Rounding of a speed [m/s].
 AT_REST = 1e-9
 # Sections that a bar is cut into for the permitted rate, instants of a stop that are looked at; up
 # to when that matters [s].
 SECTIONS, INSTANTS, LATEST = 8, 8, 10.0
 # Steps of the search for the permitted rate; the time between two places of a difference [s].
-STEPS, STEP = 6, 1e-4
+RATE_HALVINGS, DIFFERENCE_TIME = 6, 1e-4
 # Smallest velocities that are divided by [rad/s].
 TINY, SLOW = 1e-6, 1e-3
 
@@ -208,7 +208,7 @@ def first_blocked(points, begin, contact, arm, body, quartic, cubic, found):
     for i in range(n_pieces):
         length = times[i + 1] - times[i]
         share = min(max(0.0, (begin - times[i]) / length), 1.0)
-        n_parts = max(1, math.ceil((1.0 - share) * length / FIRST - 1e-9))
+        n_parts = max(1, math.ceil((1.0 - share) * length / LONGEST_INTERVAL - 1e-9))
         smallest = (1.0 - share) / n_parts / 2.0**HALVINGS
         left = share
         step = (1.0 - share) / n_parts
@@ -377,7 +377,7 @@ def permitted_rates(
         slowest, joint, slows, fades = 0.0, 0, math.inf, math.inf
         for k in range(dof):
             v = abs(state[1, k])
-            q[k], nearby[k] = state[0, k], state[0, k] + STEP * state[1, k]
+            q[k], nearby[k] = state[0, k], state[0, k] + DIFFERENCE_TIME * state[1, k]
             takes = stop_time(v, stop_acceleration[k], stop_jerk[k])
             if takes > slowest:
                 slowest, joint = takes, k
@@ -402,7 +402,7 @@ def permitted_rates(
                 for c in range(3):
                     p = BAR_SIZE * bar + 4 * end + c
                     square += (other[p] - points[p]) ** 2
-                ends[i, 2 * bar + end] = math.sqrt(square) / STEP + flesh
+                ends[i, 2 * bar + end] = math.sqrt(square) / DIFFERENCE_TIME + flesh
         latest_times(points, bodies, dof, robot, rows, growths, speeds, latest[i])
     for i in range(n_rates):
         v, gains, a, j = stops[i, 0], stops[i, 1], stops[i, 2], stops[i, 3]
@@ -410,7 +410,7 @@ def permitted_rates(
         if is_rate_safe(reserve, i, v, gains, a, j, step, latest, ends, contact, n_bars):
             low = 1.0
         else:
-            for _ in range(STEPS):
+            for _ in range(RATE_HALVINGS):
                 middle = 0.5 * (low + high)
                 rate = reserve * middle
                 if is_rate_safe(rate, i, v, gains, a, j, step, latest, ends, contact, n_bars):
