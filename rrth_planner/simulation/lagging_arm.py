@@ -11,6 +11,7 @@ from rrth_planner.model.trajectory import MotionState
 from rrth_planner.simulation.trajectory_controller import (
     ControllerRules,
     DEFAULT_RULES,
+    MeasuredState,
     TimedPoints,
     TrajectoryController,
 )
@@ -57,15 +58,15 @@ class LaggingArm:
         return setpoint
 
     @property
-    def measured(self) -> MotionState:
+    def measured(self) -> MeasuredState:
         """What encoders read now."""
         return self.measured_at(self.time)
 
-    def measured_at(self, time: float) -> MotionState:
+    def measured_at(self, time: float) -> MeasuredState:
         """
         Return what encoders read at a time between the last two cycles [s].
 
-        The command of `lag_time` before; no accelerations (NaN).
+        The command of `lag_time` before.
         """
         then = time - self.lag_time
         times = [due for due, _ in self._setpoints]
@@ -74,4 +75,4 @@ class LaggingArm:
         if k + 1 < len(times) and then > times[k]:
             share = (then - times[k]) / (times[k + 1] - times[k])
             q, v = (1.0 - share) * self._setpoints[k][1] + share * self._setpoints[k + 1][1]
-        return MotionState(positions=q, velocities=v, accelerations=np.full_like(q, np.nan))
+        return MeasuredState(q, v)

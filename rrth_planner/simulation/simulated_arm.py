@@ -23,6 +23,7 @@ from rrth_planner.simulation.trajectory_controller import (
     commanded_state,
     ControllerRules,
     DEFAULT_RULES,
+    MeasuredState,
     TimedPoints,
     TrajectoryController,
 )
@@ -181,11 +182,7 @@ class SimulatedArm:
         stretch(self.physics, data.qpos)
         self._wanted = self._controller.update(
             self.time,
-            MotionState(
-                positions=self._positions,
-                velocities=self._velocities,
-                accelerations=np.full(self.arm.dof, np.nan),
-            ),
+            MeasuredState(self._positions, self._velocities),
         )
         self._late.append(self._wanted)
         acted = self._late[0]

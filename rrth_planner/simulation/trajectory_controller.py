@@ -14,6 +14,7 @@ quintic. After the last point that one holds.
 from dataclasses import dataclass
 from enum import Enum
 import functools
+from typing import NamedTuple
 
 import numpy as np
 from rrth_planner.model.arrays import Array, frozen_array
@@ -38,6 +39,18 @@ class ControllerVersion(Enum):
     def defers(self) -> bool:
         """Whether a message with a stamp ahead waits until then."""
         return self in (ControllerVersion.V6_9, ControllerVersion.BLENDING)
+
+
+class MeasuredState(NamedTuple):
+    """Positions and velocities that encoders read, (dof,) each [rad, rad/s]."""
+
+    positions: Array
+    velocities: Array
+
+    @property
+    def accelerations(self) -> Array:
+        """They are not measured: NaN."""
+        return np.full_like(self.positions, np.nan)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -94,7 +107,7 @@ class Command:
         When its time is 0 [s].
     begin : float
         To which time the state before belongs, as the controller has it [s].
-    before : MotionState or None
+    before : MotionState or MeasuredState or None
         The state from which the arm is led to the first point, where that is due later; NaN where
         unknown.
 
@@ -103,7 +116,7 @@ class Command:
     points: TimedPoints
     start_time: float
     begin: float = 0.0
-    before: MotionState | None = None
+    before: MotionState | MeasuredState | None = None
     is_holding: bool = False
 
     @property
@@ -160,7 +173,7 @@ def replace_command(
     points: TimedPoints,
     stamp: float,
     now: float,
-    before: MotionState,
+    before: MotionState | MeasuredState,
     begin: float | None = None,
 ) -> Command:
     """
@@ -170,7 +183,7 @@ def replace_command(
     ----------
     stamp : float
         When the trajectory starts [s]; 0: now.
-    before : MotionState
+    before : MotionState or MeasuredState
         From where the arm is led to the first point if that is due later: what was commanded, or
         what is measured.
     begin : float, optional
@@ -185,7 +198,7 @@ def replace_command(
     )
 
 
-def ramp_to_rest(present: MotionState, deceleration: Array, now: float) -> Command:
+def ramp_to_rest(present: MeasuredState, deceleration: Array, now: float) -> Command:
     """Return what takes each joint to rest at a constant deceleration, (dof,) [rad/s^2]."""
     v = present.velocities
     durations = np.abs(v) / deceleration
@@ -360,12 +373,11 @@ class TrajectoryController:
         """Take a message that starts at a time [s], 0: at once; one that still waits is lost."""
         self._message, self._is_waiting = (points, stamp), False
 
-    def update(self, now: float, measured: MotionState) -> MotionState:
+    def update(self, now: float, measured: MeasuredState) -> MotionState:
         """
         Return what is commanded in the cycle at a time [s], which is the state a period later.
 
-        Where a tolerance is exceeded that is the measured position. Accelerations that are not
-        measured are NaN.
+        Where a tolerance is exceeded that is the measured position.
         """
         self._take_message(now, measured)
         self.given_up = None
@@ -378,7 +390,7 @@ class TrajectoryController:
         self._last = setpoint, now
         return setpoint
 
-    def cancel(self, now: float, measured: MotionState) -> None:
+    def cancel(self, now: float, measured: MeasuredState) -> None:
         """Give the trajectory up: hold the *measured* position, or slow down from there."""
         deceleration = self.rules.deceleration
         self.command = (
@@ -387,14 +399,15 @@ class TrajectoryController:
             else ramp_to_rest(measured, deceleration, now)
         )
 
-    def _take_message(self, now: float, measured: MotionState) -> None:
+    def _take_message(self, now: float, measured: MeasuredState) -> None:
         if self._message is None:
             return
         (points, stamp), version = self._message, self.rules.version
         if version.defers and stamp > now:
             self._is_waiting = True
             return
-        before, begin = measured, now
+        before: MotionState | MeasuredState = measured
+        begin = now
         if self.rules.is_from_desired and self._last is not None:
             before, begin = self._last
             if version is ControllerVersion.V4_20:

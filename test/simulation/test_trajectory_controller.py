@@ -13,6 +13,7 @@ from rrth_planner.simulation.trajectory_controller import (
     deviation,
     hold,
     is_moving,
+    MeasuredState,
     piece_between,
     replace_command,
     TimedPoints,
@@ -105,7 +106,7 @@ def test_a_later_start_is_led_to_from_the_present_state():
 
 
 def test_a_measured_state_has_no_accelerations_so_a_cubic_leads_from_it():
-    measured = replace(AT, accelerations=np.full(DOF, np.nan))
+    measured = MeasuredState(AT.positions, AT.velocities)
     command = replace_command(points(), 6.0, 5.0, measured)
     c = np.linalg.solve(
         np.concatenate([monomials(0.0, 1), monomials(1.0, 1)])[:, :4],
