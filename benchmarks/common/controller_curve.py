@@ -11,7 +11,7 @@ from rrth_planner.model.trajectory import Trajectory
 
 NANOSECONDS = 1e9
 # Between two samples of a curve [s].
-PERIOD = 2e-4
+SAMPLE_PERIOD = 2e-4
 # Samples this near to a point of the trajectory are that point, but for rounding [s].
 SAME = 1e-10
 
@@ -82,7 +82,7 @@ def curve_of(trajectory: Trajectory) -> Curve:
     return Curve(nanoseconds / NANOSECONDS, np.stack(c, axis=1))
 
 
-def instants(curve: Curve, period: float = PERIOD) -> Instants:
+def instants(curve: Curve, period: float = SAMPLE_PERIOD) -> Instants:
     """Return a place every `period` [s], and both ends of every piece."""
     times = curve.times
     n = len(times) - 1

@@ -10,7 +10,7 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
 
 # Between two instants [s].
-PERIOD = 1e-3
+SAMPLE_PERIOD = 1e-3
 # The library is not asked about what is further apart than this on top of the margin [m].
 FAR = 0.02
 # Bars are asked about as capsules this thin, their radius taken off: of thick ones the library

@@ -16,7 +16,7 @@ from benchmarks.common.processors import OnEachProcessor
 from benchmarks.common.real_time import put_ahead
 
 # The clock is read so often; the machine stood still where that was so late [ns].
-PERIOD, LATE = 1_000_000, 1_000_000
+READ_PERIOD, STANDSTILL = 1_000_000, 1_000_000
 # Between two looks at whether it is over, which take much longer: they would be felt.
 LOOKS = 100
 # Above the nodes, which are themselves ahead of the client.
@@ -111,9 +111,9 @@ def watch(pipe: Connection) -> list[tuple[int, int]]:
     pipe.send(None)
     while not pipe.poll():
         for _ in range(LOOKS):
-            time.sleep(PERIOD * 1e-9)
+            time.sleep(READ_PERIOD * 1e-9)
             now = time.monotonic_ns()
-            if now - before > PERIOD + LATE:
+            if now - before > READ_PERIOD + STANDSTILL:
                 present = time.time_ns()
                 found.append((present - (now - before), present))
             before = now

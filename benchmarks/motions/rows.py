@@ -14,7 +14,7 @@ from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import MotionLimits
 
 from benchmarks.common.controller_curve import Curve, curve_of, derivative, instants
-from benchmarks.common.fcl_checker import least_distance, PERIOD
+from benchmarks.common.fcl_checker import least_distance, SAMPLE_PERIOD
 from benchmarks.common.queries import table_1_arm
 from benchmarks.common.task import origin, Row
 from benchmarks.motions.path import distances, planned_pieces
@@ -112,7 +112,7 @@ def _judged(motion: Motion, limits: MotionLimits) -> Row:
 def _fcl_distance(motion: Motion, curve: Curve) -> float:
     """Return the least distance by python-fcl, at the end out to the target [m]."""
     arm, scene = table_1_arm(), motion.scene
-    q = derivative(curve, instants(curve, PERIOD), 0)
+    q = derivative(curve, instants(curve, SAMPLE_PERIOD), 0)
     along = least_distance(arm, scene, q, RAY, MARGIN)
     return min(
         along, least_distance(arm, scene, q[-1:], max(RAY, motion.plan.target_distance), MARGIN)

@@ -19,7 +19,7 @@ from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.simulation.contacts import ContactEvent
 from rrth_planner.simulation.moving_body import MovingBody, recorded_body
-from rrth_planner.simulation.simulated_arm import PERIOD, SimulatedArm
+from rrth_planner.simulation.simulated_arm import SimulatedArm, STEP_PERIOD
 
 from benchmarks.physics.setting import arm_of, points_of, Setup
 from benchmarks.separation.lockstep import Controller, Timing
@@ -65,7 +65,7 @@ class PhysicalController(Controller):
         """Let the arm go on to a time [s]."""
         arm = self.arm
         assert arm is not None
-        while arm.time < time - 0.5 * PERIOD:
+        while arm.time < time - 0.5 * STEP_PERIOD:
             while self.letters and self.letters[0][0] <= arm.time:
                 _, trajectory, begin = self.letters.popleft()
                 arm.execute(points_of(trajectory), begin)

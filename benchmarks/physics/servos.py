@@ -29,7 +29,7 @@ from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.simulation.body_shapes import whole_box
 from rrth_planner.simulation.moving_body import standing_body
-from rrth_planner.simulation.simulated_arm import ArmReading, PERIOD, SimulatedArm
+from rrth_planner.simulation.simulated_arm import ArmReading, SimulatedArm, STEP_PERIOD
 from rrth_planner.timing.fast_stop import fast_stop
 
 from benchmarks.common.random_draws import random_wearer
@@ -170,13 +170,13 @@ class _Execution:
         self._watch(stop.duration + SETTLING)
 
     def _advance(self, seconds: float) -> None:
-        for _ in range(round(seconds / PERIOD)):
+        for _ in range(round(seconds / STEP_PERIOD)):
             self.arm.step()
 
     def _watch(self, seconds: float) -> None:
         """Let time pass, and judge each joint state."""
         states: list[ArmReading] = []
-        for _ in range(round(seconds / PERIOD / STEPS)):
+        for _ in range(round(seconds / STEP_PERIOD / STEPS)):
             for _ in range(STEPS):
                 self.arm.step()
             state = self.arm.reading

@@ -12,7 +12,12 @@ from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.planning.planner import plan
-from rrth_planner.planning.pointing_goals import FEW, goal_configurations, MANY, pointing_problem
+from rrth_planner.planning.pointing_goals import (
+    FEW_DRAWS,
+    goal_configurations,
+    MANY_DRAWS,
+    pointing_problem,
+)
 from rrth_planner.planning.result import PlanResult
 
 from benchmarks.common.clock import timed, uncollected
@@ -46,7 +51,7 @@ def query(
     case: Case,
     rng: np.random.Generator,
     options: RRTHOptions = OPTIONS,
-    draws: tuple[int, ...] = (FEW, MANY),
+    draws: tuple[int, ...] = (FEW_DRAWS, MANY_DRAWS),
 ) -> PlanResult | None:
     """Return the answer to a full query; None where no posture that aims is free."""
     for n_draws in draws:
@@ -82,7 +87,7 @@ def cases(body: int, n: int) -> list[Case]:
     found: list[Case] = []
     while len(found) < n:
         goal = PointingGoal(random_target(rng))
-        if len(goal_configurations(arm, goal, world, q_start, MANY).q_goals):
+        if len(goal_configurations(arm, goal, world, q_start, MANY_DRAWS).q_goals):
             found.append(Case(scene=scene, world=world, q_start=q_start, goal=goal))
         # Every other query begins somewhere else.
         q_start = free_configurations(rng, world, 1)[0] if len(found) % 2 else q_start
@@ -130,7 +135,7 @@ def _runs(body: int, n: int, n_long: int) -> list[Row]:
 def _best_cost(arm: ArmModel, case: Case, n_long: int, least: float) -> float:
     """Return the least cost of the long runs and of what is known [rad]."""
     for seed in range(n_long):
-        result = query(arm, case, np.random.default_rng([seed, 11]), LONG, (MANY,))
+        result = query(arm, case, np.random.default_rng([seed, 11]), LONG, (MANY_DRAWS,))
         if result is not None and result.path is not None:
             least = min(least, result.path.length)
     return least

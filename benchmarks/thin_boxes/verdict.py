@@ -22,7 +22,7 @@ from rrth_planner.pipeline.request import PlanQuestion
 from benchmarks.thin_boxes.questions import question_of
 
 # Between the instants at which the reference looks at a motion [s].
-PERIOD = 1e-3
+SAMPLE_PERIOD = 1e-3
 # Rounding, and what a certified escape may be deeper than at its start [m].
 HAIR = 3e-6
 
@@ -81,7 +81,9 @@ def faults_of(question: PlanQuestion, plan: MotionPlan) -> tuple[str, ...]:
     arm, scene, margin = question.arm, question.scene, question.margin
     ray = question.ray_guard_length
     faults = []
-    times = np.union1d(np.arange(out, trajectory.duration, PERIOD), [out, trajectory.duration])
+    times = np.union1d(
+        np.arange(out, trajectory.duration, SAMPLE_PERIOD), [out, trajectory.duration]
+    )
     q = positions_at(trajectory, times)
     if first_contact(arm, scene, q, ray, margin - HAIR) is not None:
         faults.append('it is within the margin after its escape')
@@ -92,7 +94,9 @@ def faults_of(question: PlanQuestion, plan: MotionPlan) -> tuple[str, ...]:
         faults.append('it begins near the middle of a box')
     elif depths.max(initial=0.0) >= question.escape_depth + HAIR:
         faults.append('it begins deeper than an arm may that escapes')
-    elif _gets_deeper(question, positions_at(trajectory, np.arange(0.0, out, PERIOD)), depths):
+    elif _gets_deeper(
+        question, positions_at(trajectory, np.arange(0.0, out, SAMPLE_PERIOD)), depths
+    ):
         faults.append('a bar gets deeper than at the start')
     return tuple(faults)
 

@@ -11,7 +11,7 @@ import time
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
-from rrth_planner.cli import plain_parsers
+from rrth_planner.cli.parsers.campaign import parser
 from rrth_planner.cli.program import interrupt_on_signals, INTERRUPTED, run, say
 from rrth_planner.io.extras import require
 from rrth_planner.model.errors import OptionsError, RecordError, RrthError
@@ -23,12 +23,12 @@ LIBRARIES = ('distributed', 'pyarrow', 'tqdm')
 WRONG = 2
 # Queries in a task: it must take far longer than the millisecond or so that dask spends on one;
 # and tasks of a campaign, where it has so many queries: enough to keep many workers busy.
-MOST, FEWEST = 64, 256
+MOST_QUERIES, FEWEST_TASKS = 64, 256
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Plan all queries, print how many have which status, and return the exit code."""
-    options = plain_parsers.campaign().parse_args(arguments)
+    options = parser().parse_args(arguments)
     return run('campaign', lambda: _campaign(options), WRONG)
 
 
@@ -62,7 +62,7 @@ def _campaign(options: argparse.Namespace) -> int:
     done = finished(options.output, schema)
     batches = read_batches(
         options.queries,
-        max(1, min(MOST, n_queries // FEWEST)),
+        max(1, min(MOST_QUERIES, n_queries // FEWEST_TASKS)),
         arm=str(options.arm or ''),
         body=str(options.body or ''),
         seed=None if settings.seed == -1 else settings.seed,

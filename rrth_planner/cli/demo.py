@@ -18,7 +18,7 @@ import numpy as np
 import rclpy
 from rclpy.serialization import deserialize_message
 from rclpy.signals import SignalHandlerOptions
-from rrth_planner.cli import ros_parsers
+from rrth_planner.cli.parsers.demo import parser
 from rrth_planner.cli.program import interrupt_on_signals, INTERRUPTED
 from rrth_planner.collision.motion_inspection import inspect_motion
 from rrth_planner.collision.separation_inspection import (
@@ -72,7 +72,7 @@ SIMULATION = 'arm_simulation'
 # late to them [s].
 SERVO_DELAY = 0.02
 # They come to their goals so long after they are slow [s].
-SETTLING = 0.5
+SETTLING_TIME = 0.5
 HEADER = (
     f'{"target":10}{"planning":>12}{"path":>11}{"duration":>11}{"clearance":>12}{"ray error":>12}'
 )
@@ -80,7 +80,7 @@ HEADER = (
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the demo and return the exit code."""
-    options = ros_parsers.demo().parse_args(arguments)
+    options = parser().parse_args(arguments)
     interrupt_on_signals()
     try:
         _run(options)
@@ -146,7 +146,7 @@ def _run(options: argparse.Namespace) -> None:
         first.enter_context(planner('false'))
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         stack.callback(rclpy.try_shutdown)
-        rest = (REST_SPEED, SETTLING) if options.physics else (STILL, 0.0)
+        rest = (REST_SPEED, SETTLING_TIME) if options.physics else (STILL, 0.0)
         client = DemoClient(arm, options.timeout, check, *rest)
         stack.callback(client.destroy_node)
         client.wait_for_nodes()

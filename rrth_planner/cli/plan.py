@@ -10,7 +10,6 @@ import sys
 from typing import Any
 
 import numpy as np
-from rrth_planner.cli import plain_parsers
 from rrth_planner.cli.file_question import (
     figures_of,
     free_start_of,
@@ -22,6 +21,7 @@ from rrth_planner.cli.file_question import (
     start_of,
 )
 from rrth_planner.cli.mount_pose import mount_pose
+from rrth_planner.cli.parsers.plan import parser
 from rrth_planner.cli.program import run, say
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.motion_file import check_suffix, sampled, write_motion
@@ -34,7 +34,7 @@ SOLVED, REJECTED, WRONG = 0, 1, 2
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Plan a motion, print its figures, write it, and return the exit code."""
-    options = plain_parsers.plan().parse_args(arguments)
+    options = parser().parse_args(arguments)
     return run('plan', lambda: _plan(options), WRONG)
 
 

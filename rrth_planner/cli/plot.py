@@ -9,8 +9,8 @@ import sys
 from typing import TYPE_CHECKING
 
 import numpy as np
-from rrth_planner.cli import plain_parsers
 from rrth_planner.cli.file_question import folded, new_seed, plan_of, question_of, settings_of
+from rrth_planner.cli.parsers.plot import parser
 from rrth_planner.cli.program import run, say
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.extras import require, ROS
@@ -29,7 +29,7 @@ TOOLS = (ROS, 'mcap', 'mcap_ros2', 'rosbags', 'zstandard')
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Draw a picture and return the exit code."""
-    options = plain_parsers.plot().parse_args(arguments)
+    options = parser().parse_args(arguments)
     return run('plot', lambda: _draw(options), 1)
 
 

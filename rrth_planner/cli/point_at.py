@@ -16,7 +16,7 @@ import rclpy
 from rclpy.exceptions import InvalidNamespaceException, ROSInterruptException
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
-from rrth_planner.cli import ros_parsers
+from rrth_planner.cli.parsers.point_at import parser
 from rrth_planner.cli.program import interrupt_on_signals, INTERRUPTED, say
 from rrth_planner.io.extras import require
 from rrth_planner.model.arm import pointing_error
@@ -68,7 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     interrupt_on_signals()
     try:
-        options = ros_parsers.point_at().parse_args(remove_ros_args(['point_at', *given])[1:])
+        options = parser().parse_args(remove_ros_args(['point_at', *given])[1:])
     except RuntimeError as problem:
         say('point_at', _of_ros_args(problem))
         return USAGE

@@ -16,6 +16,8 @@ from rrth_planner.model.errors import one_line, RrthError
 INTERRUPTED = 130
 # As a shell reports a program that SIGPIPE has ended.
 OUTPUT_CLOSED = 141
+# Help of the option that names the file of the wearer.
+BODY_HELP = 'the wearer, laid out as config/body.yaml, the default, or as msg_examples/body.yaml'
 
 
 def program(name: str) -> str:
@@ -70,6 +72,12 @@ def add_target(parser: argparse.ArgumentParser, text: str, required: bool = True
     parser.add_argument(
         '--target', type=number('m'), nargs=3, required=required, metavar=xyz, help=text
     )
+
+
+def add_mount(parser: argparse.ArgumentParser, text: str) -> None:
+    """Add the option that says where an arm is worn, with its help."""
+    pose = ('X', 'Y', 'Z', 'QX', 'QY', 'QZ', 'QW')
+    parser.add_argument('--mount', type=number('m'), nargs=7, metavar=pose, help=text)
 
 
 def run(name: str, action: Callable[[], int | None], failed: int) -> int:

@@ -8,7 +8,7 @@ import time
 from rrth_planner.cli.program import say
 
 # Nothing is said of what takes less than this; without a terminal, it is said so often [s].
-PATIENCE, PERIOD = 1.0, 10.0
+SILENT_TIME, LINE_PERIOD = 1.0, 10.0
 # To the beginning of the line, and clear it.
 ERASE = '\r\x1b[K'
 
@@ -19,7 +19,7 @@ class Progress:
     def __init__(self, name: str) -> None:
         """Begin; name: of the command."""
         self._name, self._is_drawn = name, False
-        self._next = time.monotonic() + PATIENCE
+        self._next = time.monotonic() + SILENT_TIME
 
     def __call__(self, what: str) -> None:
         """Say what is being done."""
@@ -31,7 +31,7 @@ class Progress:
             self._is_drawn = True
         else:
             say(self._name, f'{what} ...')
-            self._next = now + PERIOD
+            self._next = now + LINE_PERIOD
 
     def __enter__(self) -> 'Progress':
         """Return itself."""

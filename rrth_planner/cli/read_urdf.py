@@ -10,10 +10,10 @@ import sys
 from typing import TYPE_CHECKING
 
 import numpy as np
-from rrth_planner.cli import plain_parsers
 from rrth_planner.cli.file_question import free_share_of, nothing_free, settings_of
 from rrth_planner.cli.joint_values import joint_values
 from rrth_planner.cli.mount_pose import mount_pose
+from rrth_planner.cli.parsers.read_urdf import parser
 from rrth_planner.cli.program import program, run, say
 from rrth_planner.cli.progress import Progress
 from rrth_planner.io.arm_file import arm_from_mapping, arm_to_mapping, arm_to_yaml
@@ -36,11 +36,11 @@ if TYPE_CHECKING:
     from rrth_planner.collision.free_share import FreeShare
 
 # How far away a target is proposed, as far as rays are free there [m].
-SIGHT = 1.0
+TARGET_DISTANCE = 1.0
 # So many links of an SRDF that are none of the arm are named.
 MOST_NAMED = 8
 # Bars this much longer than all links together are no links.
-LONG = 2.0
+LONG_FACTOR = 2.0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -50,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for k in range(len(given) - 1, 0, -1):
         if given[k - 1] == '--ray' and given[k] in RAYS:
             given[k - 1 : k + 1] = [f'--ray={given[k]}']
-    options = plain_parsers.read_urdf().parse_args(given)
+    options = parser().parse_args(given)
     return run('read_urdf', lambda: _import(options), 2)
 
 
@@ -111,7 +111,9 @@ def _target(arm: ArmModel, room: 'FreeShare') -> str:
     if room.aim is None:
         return '1.5 0.1 0.3'
     T = tool_pose(arm, room.aim)
-    return ' '.join(f'{value:g}' for value in np.round(T[:3, 3] + SIGHT * T[:3, 2], 2) + 0.0)
+    return ' '.join(
+        f'{value:g}' for value in np.round(T[:3, 3] + TARGET_DISTANCE * T[:3, 2], 2) + 0.0
+    )
 
 
 def _report_room(room: 'FreeShare', where: str) -> list[str]:
@@ -209,7 +211,7 @@ def _report(found: ImportedArm) -> list[str]:
         )
     longest = np.abs(arm.dh[:, [1, 3]]).max()
     size = np.linalg.norm(np.diff(chain.points, axis=0), axis=1).sum()
-    if longest > LONG * size and not arm.capsules:
+    if longest > LONG_FACTOR * size and not arm.capsules:
         lines.append(
             f'bars: up to {longest:.2f} m long in an arm of {size:.2f} m: the common normal of '
             'two nearly parallel axes is far away; make them parallel in the URDF'

@@ -17,8 +17,8 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 from rclpy.validate_topic_name import validate_topic_name
+from rrth_planner.cli.parsers.record import parser, TOPICS
 from rrth_planner.cli.program import say
-from rrth_planner.cli.ros_parsers import record, TOPICS
 from rrth_planner.io.extras import require
 from rrth_planner.model.errors import one_line, OptionsError, RrthError
 
@@ -29,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Record until a signal or the end of the duration, and return the exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        options = record().parse_args(remove_ros_args(['record', *given])[1:])
+        options = parser().parse_args(remove_ros_args(['record', *given])[1:])
         return _record(options, given)
     except (RrthError, OSError, RuntimeError, InvalidTopicNameException) as problem:
         # Errors of ROS name lines of its own sources.

@@ -14,8 +14,8 @@ import traceback
 from typing import TYPE_CHECKING
 
 import numpy as np
-from rrth_planner.cli import plain_parsers
 from rrth_planner.cli.file_question import plan_of
+from rrth_planner.cli.parsers.replay import parser
 from rrth_planner.cli.program import run, say
 from rrth_planner.io.incident import Incident, IncidentKind, versions
 from rrth_planner.io.incident_file import read_incident
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Replay the incident of a file and return the exit code."""
-    options = plain_parsers.replay().parse_args(arguments)
+    options = parser().parse_args(arguments)
     return run('replay', lambda: _replay_file(Path(options.file)), 2)
 
 

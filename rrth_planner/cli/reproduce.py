@@ -12,7 +12,7 @@ import platform
 import sys
 from typing import TYPE_CHECKING
 
-from rrth_planner.cli import plain_parsers
+from rrth_planner.cli.parsers.reproduce import parser
 from rrth_planner.cli.program import INTERRUPTED, say
 from rrth_planner.io.extras import require
 from rrth_planner.model.errors import OptionsError, RrthError
@@ -26,7 +26,7 @@ LIBRARIES = ('distributed', 'pyarrow', 'tqdm', 'matplotlib')
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the campaign, then write the report and its pictures."""
     arguments = sys.argv[1:] if arguments is None else arguments
-    options = plain_parsers.reproduce().parse_args(arguments)
+    options = parser().parse_args(arguments)
     try:
         require('campaign', *LIBRARIES)
         # Not for --help: loading the planner takes seconds, and compiling it, once, minutes.

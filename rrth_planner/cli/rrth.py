@@ -10,7 +10,6 @@ import sys
 from typing import Any, NamedTuple
 
 from rrth_planner import __version__
-from rrth_planner.cli import plain_parsers, ros_parsers
 from rrth_planner.cli.program import command_parser, say
 from rrth_planner.io.extras import require, ROS
 from rrth_planner.io.resources import resource_path
@@ -31,8 +30,7 @@ class Command(NamedTuple):
     """A command: what it does, for the list of all, and what it requires."""
 
     summary: str
-    # With its `main`; its parser is in `cli.ros_parsers` where it needs ROS, else in
-    # `cli.plain_parsers`.
+    # With its `main`; its parser is in the module of `cli.parsers` that has its name.
     module: str
     # Libraries that it requires before it is loaded, and the extras that install them.
     needs: tuple[str, ...] = ()
@@ -125,8 +123,7 @@ def _parser_of(name: str) -> argparse.ArgumentParser:
     command = COMMANDS[name]
     parser: argparse.ArgumentParser
     if not command.settings:
-        parsers = ros_parsers if ROS in command.needs else plain_parsers
-        parser = getattr(parsers, name)()
+        parser = import_module(f'rrth_planner.cli.parsers.{name}').parser()
         return parser
     help_of_node = NODE_HELP.format(resource_path(command.settings))
     parser = command_parser(

@@ -17,7 +17,7 @@ import numpy as np
 import rclpy
 from rclpy.serialization import deserialize_message
 from rclpy.signals import SignalHandlerOptions
-from rrth_planner.cli import ros_parsers
+from rrth_planner.cli.parsers.simulate import parser
 from rrth_planner.cli.program import interrupt_on_signals, run
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.extras import require
@@ -42,9 +42,9 @@ REACHED = 5e-3
 # a round of each takes [s].
 CENTER, SWING, ROUNDS = np.array([1.4, 0.0, 0.1]), np.array([0.0, 0.8, 0.3]), (1.0, 23.0, 17.0)
 # After so long without reaching a target the next one counts, and so long nodes may take to start.
-PATIENCE, LONGEST_START = 10.0, 300.0
+LONGEST_MISS, LONGEST_START = 10.0, 300.0
 # A step of the servos, and what comes late to them [s].
-TRANSPORT = 0.009
+SERVO_DELAY = 0.009
 FPS = 12.5
 SIMULATION = 'arm_simulation'
 # What the viewer says once it serves its page, among its first lines.
@@ -60,10 +60,10 @@ class _RunOver(Exception):  # noqa: N818
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run until the time is over or a signal; return the exit code."""
-    parser = ros_parsers.simulate()
-    options = parser.parse_args(arguments)
+    command = parser()
+    options = command.parse_args(arguments)
     if options.video and options.seconds == math.inf:
-        parser.error('--video: given without --seconds, expected both')
+        command.error('--video: given without --seconds, expected both')
     if options.viewer is None:
         options.viewer = not options.video
     interrupt_on_signals()
@@ -87,7 +87,7 @@ def _run(options: argparse.Namespace) -> None:
     parameters = load_yaml(planner_file)['/**']['ros__parameters']
     arm, frame = load_arm(parameters.get('arm')), parameters['base_frame']
     speed = top_tool_speed(arm, load_settings(arm.dof, planner_file).limits.velocity)
-    delay = options.lag / speed + TRANSPORT
+    delay = options.lag / speed + SERVO_DELAY
     planner = ['--ros-args', '--params-file', str(planner_file)]
     planner += ['-p', f'seed:={options.seed}', '-p', f'controller_delay:={delay:.4f}']
     print(f'Starting planner and simulation (ROS_DOMAIN_ID {os.environ["ROS_DOMAIN_ID"]}).')
@@ -119,7 +119,7 @@ def _run(options: argparse.Namespace) -> None:
         if options.viewer:
             # The last child. While it loads the machine may have no time for the physics.
             client.wait_for(lambda: any(SERVED in line for line in lines), 'the viewer')
-        client.timeout = PATIENCE
+        client.timeout = LONGEST_MISS
         targets: list[tuple[float, Array]] = []
         end = time.monotonic() + options.seconds
         # A run without an end would fill the memory with what is seen.

@@ -13,8 +13,8 @@ import sys
 from typing import Any
 import webbrowser
 
-from rrth_planner.cli import plain_parsers
 from rrth_planner.cli.file_question import question_of
+from rrth_planner.cli.parsers.viewer import parser
 from rrth_planner.cli.program import interrupt_on_signals, say
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.extras import require, ROS
@@ -35,14 +35,14 @@ from rrth_planner.wearer.skeleton import Skeleton
 
 ROS_ARGS = '--ros-args'
 # A picture is taken after so long beside a person [s].
-SHOWN = 4.0
+PICTURE_TIME = 4.0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Serve the page until it is interrupted; return the exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     at = given.index(ROS_ARGS) if ROS_ARGS in given else len(given)
-    options, ros_args = plain_parsers.viewer().parse_args(given[:at]), given[at:]
+    options, ros_args = parser().parse_args(given[:at]), given[at:]
     interrupt_on_signals()
     try:
         if ros_args and not options.live:
@@ -121,7 +121,7 @@ def _run_person(
             if options.screenshot is None:
                 page.run()
             else:
-                page.run_for(SHOWN)
+                page.run_for(PICTURE_TIME)
                 save_picture(url, options.screenshot)
         finally:
             page.model.close()

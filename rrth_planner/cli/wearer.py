@@ -12,8 +12,8 @@ import time
 import rclpy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
+from rrth_planner.cli.parsers.wearer import parser
 from rrth_planner.cli.program import run, say
-from rrth_planner.cli.ros_parsers import wearer
 from rrth_planner.io.motion_capture_file import load_person
 from rrth_planner.io.skeleton_file import load_skeleton
 from rrth_planner.model.errors import OptionsError, SceneError
@@ -32,7 +32,7 @@ FPS = 60.0
 def main(arguments: Sequence[str] | None = None) -> int:
     """Publish until a signal, and return the exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    options = wearer().parse_args(remove_ros_args(['wearer', *given])[1:])
+    options = parser().parse_args(remove_ros_args(['wearer', *given])[1:])
     return run('wearer', lambda: _publish(options, given), 1)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 import sys
 
-from rrth_planner.cli import plain_parsers
+from rrth_planner.cli.parsers.write_urdf import parser
 from rrth_planner.cli.program import run
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.resources import resource_path
@@ -19,7 +19,7 @@ from rrth_planner.model.errors import ModelError
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Write the URDF and return the exit code."""
-    options = plain_parsers.write_urdf().parse_args(arguments)
+    options = parser().parse_args(arguments)
     return run('write_urdf', lambda: _export(options), 2)
 
 

@@ -19,7 +19,7 @@ from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import positions_at, Trajectory
 
 # Sampling period of the distances of the second and the reference checker [s].
-PERIOD = 0.002
+DISTANCE_PERIOD = 0.002
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,9 +113,9 @@ def _of_piece(
         accelerations=trajectory.accelerations[i : i + 2],
     )
     certificate = certify(piece, world)
-    times = np.linspace(0.0, end - begin, 2 + math.ceil((end - begin) / PERIOD))
+    times = np.linspace(0.0, end - begin, 2 + math.ceil((end - begin) / DISTANCE_PERIOD))
     # The reference checker solves for the curve by itself.
-    _, q, _, _ = reference_checker.quintic_states(piece, PERIOD)
+    _, q, _, _ = reference_checker.quintic_states(piece, DISTANCE_PERIOD)
     found = 'violated' if certificate.is_violated else 'undecided'
     return PieceComparison(
         begin=begin,

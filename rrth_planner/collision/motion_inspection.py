@@ -19,7 +19,7 @@ from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
 
 # Sampling period of a controller's states [s].
-PERIOD = 0.0005
+STATE_PERIOD = 0.0005
 # Clearance costs more, so only every so many samples are checked for it.
 CLEARANCE_STRIDE = 8
 CONTACT_SLACK = 1e-6
@@ -80,7 +80,7 @@ def inspect_motion(
         raise UnsafeMotionError(
             f'the motion starts {gap:.2e} from the present configuration [rad]'
         )
-    times, q, v, a = quintic_states(trajectory, PERIOD)
+    times, q, v, a = quintic_states(trajectory, STATE_PERIOD)
     for what, unit, value in (('velocity', 'rad/s', v), ('acceleration', 'rad/s^2', a)):
         for end in (0, -1):
             if not np.abs(value[end]).max() <= REST:

@@ -26,15 +26,15 @@ from rrth_planner.model.trajectory import (
 )
 
 # Time intervals, within each of which the arm gets no deeper than at its start.
-INTERVALS = 12
+N_INTERVALS = 12
 # Tolerance of that depth: the certificate needs a gap, however small [m].
-GAP = 1e-6
+DEPTH_TOLERANCE = 1e-6
 # A bar this near to the middle of a box may as well be on its other side, as far as joints and
 # boxes are known. So bars escape only from boxes that, shrunk by their depth, have more than this
 # from the middle to each face [m].
 LEAST_HALF = 1e-3
 # A bar this near to a grown box counts as in it there [m].
-NEAR = 1e-5
+CONTACT_DISTANCE = 1e-5
 
 
 def box_depths(world: World, q: Array, ray_lengths: Array | None = None) -> Array:
@@ -123,7 +123,7 @@ def may_escape(world: World, depths: Array) -> NDArray[np.bool_]:
     that it is on, and the escape could lead through the wearer.
     """
     left = half_widths(world) - depths
-    found: NDArray[np.bool_] = (depths < -NEAR) | (left > LEAST_HALF + GAP)
+    found: NDArray[np.bool_] = (depths < -CONTACT_DISTANCE) | (left > LEAST_HALF + DEPTH_TOLERANCE)
     return found
 
 
@@ -137,8 +137,8 @@ def leads_out(
     box, neither that of the bars nor that of the pointing ray. Within an interval both are proven
     free of the boxes shrunk by their depth at its start; a box that they are not in, or have left,
     is not shrunk. At the end both are clear of all boxes. So the arm enters no other box, and
-    nowhere gets deeper by more than `GAP` than at the start of the interval. No bar is near the
-    middle of a box: see `may_escape`.
+    nowhere gets deeper by more than `DEPTH_TOLERANCE` than at the start of the interval. No bar is
+    near the middle of a box: see `may_escape`.
 
     The ray has no body: where it is deeper than the margin, and therefore in the wearer already,
     that box does not count for it.
@@ -146,11 +146,11 @@ def leads_out(
     The world has its boxes grown by the margin [m]; end: when the arm has to be clear, begin:
     start of the part that is checked [s].
     """
-    times = np.linspace(min(max(begin, 0.0), end), end, INTERVALS + 1)
+    times = np.linspace(min(max(begin, 0.0), end), end, N_INTERVALS + 1)
     deep = escape_depths(world, positions_at(trajectory, times))
     if deep.size == 0:
         return True
-    allowed = np.where(deep[0] > -GAP, _allowed_depths(deep), 0.0)
+    allowed = np.where(deep[0] > -DEPTH_TOLERANCE, _allowed_depths(deep), 0.0)
     # The grown box vanishes where it does not count for the ray.
     allowed[:, 1] = np.where(deep[:, 1] > margin, half_widths(world), allowed[:, 1])
     of_bars, of_arm = allowed[:, 0], allowed.max(axis=1)
@@ -164,7 +164,7 @@ def leads_out(
     part, first = cut_at(trajectory, times)
     motion, bars = (piece_coefficients(part), *bounds_of(part)), without_ray(world)
     for_arm, for_bars = _shrunk(world, of_arm), _shrunk(world, of_bars)
-    for i in range(INTERVALS):
+    for i in range(N_INTERVALS):
         # Once the arm is clear of all boxes, the remaining time is one interval.
         is_out = not of_arm[i].any()
         pieces = [rows[first[i] : None if is_out else first[i + 1]] for rows in motion]
@@ -190,5 +190,7 @@ def gets_no_deeper(trajectory: Trajectory, world: World, begin: float) -> bool:
 
 def _allowed_depths(deep: Array) -> Array:
     """Return how deep parts may be that are so deep in boxes, of any shape [m]."""
-    allowed: Array = np.where(deep > -GAP, np.maximum(deep + GAP, 0.0), 0.0)
+    allowed: Array = np.where(
+        deep > -DEPTH_TOLERANCE, np.maximum(deep + DEPTH_TOLERANCE, 0.0), 0.0
+    )
     return allowed

@@ -29,13 +29,13 @@ from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import part_of, piece_coefficients, positions_at, Trajectory
 
 # Spacing of the grid of instants that may be sampled [s].
-PERIOD = 0.001
+GRID_PERIOD = 0.001
 # Distances this much below the margin are rounding of the library, not violations [m].
 TOLERANCE = 3e-6
 # During an escape this distance is demanded from boxes that much smaller: the library does not
 # report the penetration depth of a contact. Where nothing is left of such a box, the arm is too
 # near to its middle for a side to escape to [m].
-APART = 1e-3
+ESCAPE_DISTANCE = 1e-3
 # Samples taken at once within a gap: of many, some may turn out to be needless.
 MAX_SAMPLES = 8
 # Intervals that each piece is cut into, and the powers of u that q'(u) has at their ends.
@@ -145,7 +145,7 @@ class _Advancement:
     ) -> None:
         self._arm, self._trajectory, self._margins = arm, trajectory, margins
         self._library, self._boxes = library, boxes_of(scene, library)
-        self.last = max(1, math.ceil(trajectory.duration / PERIOD))
+        self.last = max(1, math.ceil(trajectory.duration / GRID_PERIOD))
         self._times = np.linspace(0.0, trajectory.duration, self.last + 1)
         self.displacements = displacements(arm, trajectory, self._times, ray_length)
         self.bars = [PlacedBar(arm, k, ray_length, library) for k in range(len(bars_of(arm)))]
@@ -227,8 +227,8 @@ def first_violation(
 
     Conservative advancement to both sides: a sample proves a bar free, before and after, for as
     long as no point of it moves further than its distance. What two samples leave open between
-    them is sampled again, at intervals of `PERIOD` at least: each instant of that grid is checked
-    or proven free.
+    them is sampled again, at intervals of `GRID_PERIOD` at least: each instant of that grid is
+    checked or proven free.
 
     The scene is in the base frame. margin: distance to keep from every box; ray_guard_length,
     reach: how much of the ray must stay clear in motion, and at the end [m]; library: name of one
@@ -299,9 +299,9 @@ def first_escape_violation(
     depths (2, m): penetration depths at the start in each box, grown by the margin, of the bars
     without the pointing ray and of the ray: by how much the box would have to shrink on every
     side for them to be clear [m]; < 0: clear. No motion may exceed them, except in a box that the
-    ray is in itself, without the margin, or not `APART` from the middle of: that counts for the
-    other bars alone, which may never be so deep. escape_time: when the escape ends; 0: there is
-    none [s]. All else as for `first_violation`.
+    ray is in itself, without the margin, or not `ESCAPE_DISTANCE` from the middle of: that counts
+    for the other bars alone, which may never be so deep. escape_time: when the escape ends; 0:
+    there is none [s]. All else as for `first_violation`.
     """
     if escape_time == 0.0:
         return None
@@ -315,8 +315,8 @@ def first_escape_violation(
         for i, box in enumerate(scene.boxes):
             if is_void[i] and ray > 0.0:
                 continue
-            by, apart = margin - max(float(depth[i]), 0.0), APART
-            size = box.size + 2.0 * (by - APART)
+            by, apart = margin - max(float(depth[i]), 0.0), ESCAPE_DISTANCE
+            size = box.size + 2.0 * (by - ESCAPE_DISTANCE)
             if (size > 0.0).all():
                 box = Box(box.name, box.center, size, box.rotation)
             elif depth[i] <= 0.0:

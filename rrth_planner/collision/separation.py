@@ -4,12 +4,12 @@
 
 from dataclasses import dataclass
 import functools
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from rrth_planner.collision.certificate import BERNSTEIN_3, BERNSTEIN_4
 from rrth_planner.collision.world import allowed_bars, arm_rows, mount_inverse, SLACK
+from rrth_planner.kernels import jit
 from rrth_planner.kernels.collision.separation import first_blocked, permitted_rates
 from rrth_planner.model.arm import ArmModel, bars_of
 from rrth_planner.model.arrays import Array
@@ -47,11 +47,11 @@ def first_unproven(
         return None
     found = np.empty(2)
     blocking = first_blocked(
-        trajectory.times,
-        *trajectory.states,
+        jit.Points(trajectory.times, *trajectory.states),
         begin,
         rules.contact_speed,
-        *_numbers_of(arm, body, growth_at(body, rules, margin + SLACK, 0.0)),
+        _arm_numbers(arm),
+        _body_numbers(arm, body, growth_at(body, rules, margin + SLACK, 0.0)),
         BERNSTEIN_4,
         BERNSTEIN_3,
         found,
@@ -87,21 +87,29 @@ def permitted_ahead(
         places,
         n_rates,
         reserve,
-        *settings.limits.rows[1:],
-        *settings.stop_limits.rows[1:],
+        settings.limits.rows,
+        settings.stop_limits.rows,
         rules.contact_speed,
-        *_numbers_of(arm, body, growth_at(body, rules, margin + SLACK, settings.stretch)),
+        _arm_numbers(arm),
+        _body_numbers(arm, body, growth_at(body, rules, margin + SLACK, settings.stretch)),
         found,
     )
     return found
 
 
-def _numbers_of(arm: ArmModel, body: SeenBody, growths: Array) -> tuple[Any, ...]:
-    """Return arm and wearer as the kernels take them; growths (m,): of the boxes [m]."""
+@functools.lru_cache(maxsize=16)
+def _arm_numbers(arm: ArmModel) -> jit.Arm:
+    """Return an arm as the kernels take it, its pointing ray left out."""
     robot, chain = arm_rows(arm, 0.0)
-    numbers, allowed = body.scene.numbers, allowed_bars(arm, body.scene)
-    sight = numbers, allowed, mount_inverse(arm), growths, body.speeds
-    return moving_joints(arm), chain, robot, *sight
+    return jit.Arm(jit.address(chain), robot, moving_joints(arm))
+
+
+def _body_numbers(arm: ArmModel, body: SeenBody, growths: Array) -> jit.Body:
+    """Return a wearer as the kernels take him; growths (m,): of the boxes [m]."""
+    allowed = allowed_bars(arm, body.scene)
+    for array in (allowed, growths):
+        array.setflags(write=False)
+    return jit.Body(body.scene.numbers, allowed, mount_inverse(arm), growths, body.speeds)
 
 
 @functools.lru_cache(maxsize=16)

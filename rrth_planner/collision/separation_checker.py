@@ -18,7 +18,7 @@ from rrth_planner.model.trajectory import sample, Trajectory
 
 # Spacing of the instants that are sampled: between two of them a hand at 2 m/s and a tip as fast
 # come 2 cm closer [s].
-PERIOD = 0.005
+SAMPLING_PERIOD = 0.005
 # Speeds no further than this above the contact speed are rounding [m/s].
 ROUNDING = 1e-9
 # How often the part of a bar is halved in which its speed crosses a value: to 1e-9 of its length.
@@ -36,14 +36,15 @@ def first_separation_violation(
     """
     Return where a motion that begins at the instant of the body first breaks the separation.
 
-    Every `PERIOD` and at the end: the parts of each bar that are faster than the contact speed, as
-    capsules, from each box grown by all that is assumed of it and by margin [m]. The deepest
-    violation of the first such instant, with its distance from the box as it was seen; or None.
+    Every `SAMPLING_PERIOD` and at the end: the parts of each bar that are faster than the contact
+    speed, as capsules, from each box grown by all that is assumed of it and by margin [m]. The
+    deepest violation of the first such instant, with its distance from the box as it was seen; or
+    None.
     The pointing ray has no body and does not count; pairs of `arm.allowed` do not either. library:
     name of one of `distance_library.LIBRARIES`.
     """
     bars, boxes = bars_of(arm)[:-1], body.scene.boxes
-    times = np.append(np.arange(0.0, trajectory.duration, PERIOD), trajectory.duration)
+    times = np.append(np.arange(0.0, trajectory.duration, SAMPLING_PERIOD), trajectory.duration)
     q, v, _ = sample(trajectory, times)
     if not bars or not boxes or not v.any():
         return None

@@ -21,14 +21,14 @@ from rrth_planner.model.separation import seen_body, SeparationRules, speed_boun
 from rrth_planner.model.trajectory import part_of, Trajectory
 
 # A commitment is judged at its points and so often [s].
-PERIOD = 0.01
+CHECK_PERIOD = 0.01
 # A planner may have known no newer body than one that is so old, where there are newer ones [s].
-OLDEST = 0.2
+OLDEST_BODY = 0.2
 # A part that was faster than assumed excuses what happens for so long [s].
-EXCUSED = 2.0
+EXCUSED_TIME = 2.0
 # Bodies that come so many periods after each other: there may have been one between them that was
 # not received here.
-GAP = 1.5
+GAP_PERIODS = 1.5
 _CORNERS = 0.5 * np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 
 
@@ -171,7 +171,7 @@ def _violations(
     own = part_of(trajectory, min(published - begin, trajectory.duration), trajectory.duration)
     for k in reversed(_known(sights, published)):
         body = seen_body(sights.scenes[k], published - float(sights.times[k]), rules)
-        found.append(separation_violations(arm, body, own, rules, margin, period=PERIOD))
+        found.append(separation_violations(arm, body, own, rules, margin, period=CHECK_PERIOD))
         if not found[-1]:
             return []
     return found[0]
@@ -182,19 +182,19 @@ def _known(sights: Sights, time: float) -> range:
     end = sights.between(-np.inf, time).stop
     if end == 0:
         raise UnsafeMotionError('a commitment is published before there is a body, expected one')
-    return range(min(sights.between(time - OLDEST, time).start, end - 1), end)
+    return range(min(sights.between(time - OLDEST_BODY, time).start, end - 1), end)
 
 
 def _has_gap(sights: Sights, time: float) -> bool:
     """Return whether a body may be missing that was published shortly before a time [s]."""
     some = _known(sights, time)
     period = float(np.median(np.diff(sights.times)))
-    return bool(np.diff([*sights.times[some], time]).max() > GAP * period)
+    return bool(np.diff([*sights.times[some], time]).max() > GAP_PERIODS * period)
 
 
 def _was_faster(sights: Sights, name: str, time: float, rules: SeparationRules) -> bool:
     """Return whether a part had been faster than assumed shortly before a time [s]."""
-    return _is_faster(sights, name, sights.between(time - EXCUSED, time), rules)
+    return _is_faster(sights, name, sights.between(time - EXCUSED_TIME, time), rules)
 
 
 def _is_faster(sights: Sights, name: str, some: range, rules: SeparationRules) -> bool:

@@ -58,9 +58,9 @@ class World(Frozen):
         Lowest and highest configuration [rad or m].
     chain : compiled function
         The arm's forward kinematics, `kernels.jit.CHAIN`.
-    robot : ndarray, shape (n_rows, 8 + 2 dof)
+    robot : ndarray, shape (n_rows, 9 + 2 dof)
         The arm as numbers, rows and columns as in `kernels.layout`.
-    obstacles : ndarray, shape (n_groups, 8 * 16)
+    obstacles : ndarray, shape (n_groups, 8 * 18)
         Boxes grown by the margin, in the arm's base frame, groups as in `kernels.layout` [m]. On a
         map: lower and upper corners, shape (m, 2 dof).
     edge_check, free_radius, contacts : compiled function
@@ -73,6 +73,13 @@ class World(Frozen):
         Which lane of the last level of groups holds box i.
     pair_names : tuple of (str, str)
         Names of the bars of the arm that must not collide.
+
+    Attributes
+    ----------
+    functions : ndarray, shape (4,)
+        Addresses of the compiled seams, entries as in `kernels.jit`.
+    space : Space
+        What searches are handed: functions, resolution, robot, obstacles, bounds.
 
     Raises
     ------
@@ -341,4 +348,5 @@ def _bars_by_name(arm: ArmModel) -> dict[str, int]:
 def mount_inverse(arm: ArmModel) -> Array:
     """Return the pose of the base frame in that of the arm, (4, 4) [m]."""
     inverse: Array = np.linalg.inv(arm.T_base_mount).astype(np.float64)
+    inverse.setflags(write=False)
     return inverse

@@ -21,9 +21,9 @@ from tqdm import tqdm
 
 # Tasks of each worker that are handed out: enough that none waits while one of them takes long,
 # and few enough that what is handed out stays small.
-AHEAD = 16
+TASKS_AHEAD = 16
 # So long a scheduler may be without workers [s].
-PATIENCE = 30.0
+LONGEST_IDLE = 30.0
 # Results are saved at least so often [s], what an interruption may lose, unless that takes longer
 # than this share of the time.
 SAVE_PERIOD, SAVE_SHARE = 20.0, 0.05
@@ -70,11 +70,11 @@ def _client_of(scheduler: str) -> Any:
             'tcp://HOST:PORT'
         ) from problem
     try:
-        client.wait_for_workers(1, timeout=PATIENCE)
+        client.wait_for_workers(1, timeout=LONGEST_IDLE)
     except TooLate as problem:
         client.close()
         raise RrthError(
-            f'scheduler {scheduler}: no worker in {PATIENCE:g} s, expected at least one'
+            f'scheduler {scheduler}: no worker in {LONGEST_IDLE:g} s, expected at least one'
         ) from problem
     return client
 
@@ -85,7 +85,7 @@ def in_order(client: Any, function: Callable[[Any], Any], batches: Iterable[Any]
 
     Raise RrthError where the cluster ends, or a batch ends one worker after another.
     """
-    ahead = AHEAD * max(1, sum(client.nthreads().values()))
+    ahead = TASKS_AHEAD * max(1, sum(client.nthreads().values()))
     futures: deque[Any] = deque()
     for batch in batches:
         # A run on another machine, or of an edited source, is not the same: never pure.

@@ -22,7 +22,7 @@ from rrth_planner.model.errors import RrthError
 # What pyarrow raises for a file that is not what it should be.
 PROBLEMS = (pa.ArrowException, KeyError, ValueError, OSError)
 # Rows that are copied at a time, and written as one group.
-GROUP = 65_536
+GROUP_ROWS = 65_536
 
 
 def read_table(path: Path, schema: Any, what: str) -> Any:
@@ -53,7 +53,7 @@ def append_table(path: Path, table: Any) -> None:
             if path.exists():
                 # Never all rows in memory.
                 with pq.ParquetFile(path) as old:
-                    for batch in old.iter_batches(GROUP):
+                    for batch in old.iter_batches(GROUP_ROWS):
                         writer.write_batch(batch)
             writer.write_table(table)
 

@@ -77,6 +77,48 @@ class Space(NamedTuple):
 
 SPACE = types.NamedTuple([READ_INTS, float64, MAT, MAT, MAT], Space)
 
+
+class Arm(NamedTuple):
+    """An arm as kernels that Python calls take it: address of its chain, rows, joints per bar."""
+
+    chain: Any
+    robot: Any
+    joints: Any
+
+
+class Body(NamedTuple):
+    """
+    A wearer as he was seen.
+
+    boxes (m, 15), allowed (m,) and T_arm_base (4, 4) as for `boxes.rows_of`; by how much each box
+    is grown at time 0, growths (m,) [m], and its greatest speed, speeds (m,) [m/s].
+    """
+
+    boxes: Any
+    allowed: Any
+    T_arm_base: Any
+    growths: Any
+    speeds: Any
+
+
+class Points(NamedTuple):
+    """
+    The points of a motion.
+
+    times (n,) [s], n > 1; positions, velocities and accelerations (n, dof).
+    """
+
+    times: Any
+    positions: Any
+    velocities: Any
+    accelerations: Any
+
+
+# As `Space`: from Python all their arrays are read-only.
+ARM = types.NamedTuple([int64, MAT, READ_INTS], Arm)
+BODY = types.NamedTuple([MAT, READ_INTS, MAT, VEC, VEC], Body)
+POINTS = types.NamedTuple([VEC, MAT, MAT, MAT], Points)
+
 # A third: (space, path, n, how) -> number of waypoints of the path, made shorter in place; how:
 # settings of its own.
 SHORTEN = types.FunctionType(int64(SPACE, OUT_MAT, int64, VEC))

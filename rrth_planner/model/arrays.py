@@ -19,7 +19,7 @@ FARTHEST = 1e4
 
 FLOAT = np.dtype(np.float64)
 # So many elements are looked at sooner one by one.
-FEW = 16
+FEW_ELEMENTS = 16
 # What counts as a number; true does not, though Python takes it for one.
 NUMBERS = (int, float, np.integer, np.floating)
 
@@ -119,7 +119,7 @@ def _size(array: Array) -> float:
 
     It is finite where all elements are, unless it overflows.
     """
-    if array.size > FEW:
+    if array.size > FEW_ELEMENTS:
         return math.sqrt(np.vdot(array, array))
     # A third of the time.
     total: float = sum(map(abs, array.ravel().tolist()))

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from rrth_planner.collision.penetration import (
     box_depths,
-    GAP,
+    DEPTH_TOLERANCE,
     half_widths,
-    INTERVALS,
     leads_out,
     LEAST_HALF,
     may_escape,
+    N_INTERVALS,
 )
 from rrth_planner.collision.world import grown, World
 from rrth_planner.model.arrays import Array
@@ -26,13 +26,13 @@ from rrth_planner.timing.lead_in import LeadIn
 from rrth_planner.timing.parameterization import parameterize
 
 # The longest escape [rad or m], and the number of random directions tried.
-LONGEST, N_DIRECTIONS = 1.5, 48
+LONGEST_ESCAPE, N_DIRECTIONS = 1.5, 48
 # Spacing of the search for the end of an escape [rad], and how often it is then halved.
 SPACING, HALVINGS = 0.03, 6
 # Rounds of the sequential program, and sweeps of each solution.
 N_ROUNDS, N_SWEEPS = 12, 200
 # Pairs of a bar and a box that are further apart do not push [m].
-NEAR = 0.05
+PUSH_DISTANCE = 0.05
 STEP = 1e-6
 
 
@@ -110,7 +110,7 @@ def plan_escape(
         )
     for spare in spares:
         roomy, rng = grown(world, spare), np.random.default_rng(question.seed)
-        best, least, longest = None, (True, LONGEST), LONGEST
+        best, least, longest = None, (True, LONGEST_ESCAPE), LONGEST_ESCAPE
         # The direct solution is mostly the shortest escape.
         for search in (_pushed, _scattered):
             tries = list(search(roomy, q_start, spare, longest, rng, should_stop))
@@ -126,7 +126,7 @@ def plan_escape(
                 trajectory = parameterize(Path(np.stack([q_start, tries[i]])), (), limits)
                 if leads_out(trajectory, world, question.margin, trajectory.duration):
                     best, least = trajectory, keys[i]
-                    longest = LONGEST if least[0] else least[1]
+                    longest = LONGEST_ESCAPE if least[0] else least[1]
                     break
         if best is not None:
             return Escape(
@@ -140,11 +140,11 @@ def plan_escape(
 
 def _rises(world: World, q_start: Array, q_end: Array) -> bool:
     """Return whether the depth of the ray in a box that it is in increases on an edge."""
-    shares = np.linspace(0.0, 1.0, INTERVALS + 1)[:, None]
+    shares = np.linspace(0.0, 1.0, N_INTERVALS + 1)[:, None]
     deep = box_depths(world, q_start + shares * (q_end - q_start))[:, -1]
     # Where the depth is that of the centre it is greatest.
     deep = np.minimum(deep[:, deep[0] > 0.0], half_widths(world)[deep[0] > 0.0])
-    return bool((np.diff(np.maximum(deep, 0.0), axis=0) > GAP).any())
+    return bool((np.diff(np.maximum(deep, 0.0), axis=0) > DEPTH_TOLERANCE).any())
 
 
 def _escape_sentence(world: World, of_bars: Array, of_ray: Array, hair: float) -> str:
@@ -183,7 +183,7 @@ def _pushed(
         if should_stop():
             break
         depths, gradients = _gradients(roomy, q)
-        is_near = depths > -NEAR
+        is_near = depths > -PUSH_DISTANCE
         G, s = gradients[is_near], depths[is_near] + 1e-6 + 0.01 * spare
         # Rows g x <= b of the displacement x from the start: the depths, and the joint limits.
         rows = np.concatenate([G, np.eye(len(q)), -np.eye(len(q))])

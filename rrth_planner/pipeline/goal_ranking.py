@@ -10,9 +10,9 @@ from rrth_planner.model.joint_range import keeps_room
 from rrth_planner.model.path import Path
 from rrth_planner.model.separation import seen_body, SeenBody, Separation
 from rrth_planner.model.trajectory import Trajectory
-from rrth_planner.pipeline.plan_path import SPARES
+from rrth_planner.pipeline.plan_path import SPARE_CLEARANCES
 from rrth_planner.pipeline.request import PlanQuestion
-from rrth_planner.planning.pointing_goals import FEW, goal_configurations, spreading_ratios
+from rrth_planner.planning.pointing_goals import FEW_DRAWS, goal_configurations, spreading_ratios
 from rrth_planner.timing.corner_blends import round_corners
 from rrth_planner.timing.parameterization import parameterize
 
@@ -84,7 +84,8 @@ def _straight_goals(
     has_room: only those that keep away from the joints' limits.
     """
     arm, goal = question.arm, question.goal
-    spares = [spare for spare in (question.reserve, SPARES[0]) if spare >= SPARES[0]]
+    widest = SPARE_CLEARANCES[0]
+    spares = [spare for spare in (question.reserve, widest) if spare >= widest]
     roomy = next((w for w in (grown(world, s) for s in spares) if w.is_valid(q_start)), None)
     if roomy is None:
         return []
@@ -93,7 +94,7 @@ def _straight_goals(
     found = [
         q_goal
         for place in np.clip(places, *arm.bounds)
-        for q_goal in goal_configurations(arm, goal, roomy, place, FEW).q_goals[:NEAREST]
+        for q_goal in goal_configurations(arm, goal, roomy, place, FEW_DRAWS).q_goals[:NEAREST]
         if keeps_room(arm, q_goal) or not has_room
     ]
     found.sort(key=lambda q_goal: float(np.linalg.norm(q_goal - q_start)))

@@ -28,7 +28,7 @@ from rrth_planner.model.trajectory import MotionLimits, StartState, Trajectory
 from rrth_planner.pipeline.collision_escape import Escape, plan_escape
 from rrth_planner.pipeline.goal_ranking import quickest_path
 from rrth_planner.pipeline.motion_plan import MotionPlan
-from rrth_planner.pipeline.plan_path import find_path, SPARES
+from rrth_planner.pipeline.plan_path import find_path, SPARE_CLEARANCES
 from rrth_planner.pipeline.rejection import (
     CANCELLED,
     depth_sentence,
@@ -158,7 +158,7 @@ def plan_question(
     leads: Iterable[LeadIn | None | Rejection] = (None,)
     # A joint may begin a little beyond its limit: straight edges lead it in.
     around = with_start(world, arm, q_start)
-    rejection = start_rejection(arm, grown(world, SPARES[-1]), q_start)
+    rejection = start_rejection(arm, grown(world, SPARE_CLEARANCES[-1]), q_start)
     is_in_box = rejection is not None and world.colliding_bars(q_start) is None
     if rejection is not None and rejection.status is PlanStatus.START_IN_COLLISION and is_in_box:
         if moving is not None:
@@ -167,7 +167,7 @@ def plan_question(
                 rejection, sentence=f'{sentence}, expected an arm at rest or clear of it'
             )
         else:
-            out = plan_escape(question, around, q_start, SPARES, should_stop)
+            out = plan_escape(question, around, q_start, SPARE_CLEARANCES, should_stop)
             if isinstance(out, Escape):
                 rejection, escape = None, out
                 leads = (out.lead_in(question.limits),)
@@ -185,7 +185,7 @@ def plan_question(
         q_first: Array = np.clip(q_from, *arm.bounds)
         is_led_in = len(joints_beyond(arm, q_from)) > 0
         if is_led_in:
-            rejection = led_in_rejection(arm, grown(world, SPARES[-1]), q_from, q_first)
+            rejection = led_in_rejection(arm, grown(world, SPARE_CLEARANCES[-1]), q_from, q_first)
             if rejection is not None:
                 break
         found = find_path(question, world, q_first, should_stop, begin)

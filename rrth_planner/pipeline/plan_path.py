@@ -15,16 +15,16 @@ from rrth_planner.pipeline.rejection import CANCELLED, goal_rejection, Rejection
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.planning.planner import plan, PlanResult
 from rrth_planner.planning.pointing_goals import (
-    FEW,
+    FEW_DRAWS,
     goal_configurations,
     GoalSet,
-    MANY,
+    MANY_DRAWS,
     pointing_problem,
 )
 
 # Clearance beyond the margin that the path is planned with, for its blends; in a narrow passage,
 # next to none [m].
-SPARES = (5e-3, 1e-5)
+SPARE_CLEARANCES = (5e-3, 1e-5)
 # Shares of the reserve that are tried before, each with few draws of goals and so many samples at
 # most: where there is room, few are needed.
 SHARES, FEW_SAMPLES = (1.0, 0.5, 0.25), 500
@@ -82,20 +82,20 @@ def _find_path(
     # A start may be where goals may not.
     q_near = q_start if world.is_in_bounds(q_start) else np.clip(q_start, *world.bounds)
     reserves = [share * question.reserve for share in SHARES]
-    for spare in (*(r for r in reserves if r > SPARES[0]), *SPARES, 0.0):
+    for spare in (*(r for r in reserves if r > SPARE_CLEARANCES[0]), *SPARE_CLEARANCES, 0.0):
         roomy = grown(world, spare)
         # Without spare clearance only where the start has none: an arm that was in motion.
         if not roomy.is_free(q_start) or (spare == 0.0 and goals is not None):
             continue
-        goals = goal_configurations(arm, goal, roomy, q_near, FEW)
-        if len(goals.q_goals) == 0 and spare <= SPARES[0]:
-            goals = goal_configurations(arm, goal, roomy, q_near, MANY)
+        goals = goal_configurations(arm, goal, roomy, q_near, FEW_DRAWS)
+        if len(goals.q_goals) == 0 and spare <= SPARE_CLEARANCES[0]:
+            goals = goal_configurations(arm, goal, roomy, q_near, MANY_DRAWS)
         if len(goals.q_goals) == 0:
             continue
         # Half of the time for the wide search, the rest for the narrow one.
-        share = 0.5 if spare >= SPARES[0] else 1.0
+        share = 0.5 if spare >= SPARE_CLEARANCES[0] else 1.0
         left = max(1e-3, share * options.time_limit - (time.perf_counter() - begin))
-        n_most = FEW_SAMPLES if spare > SPARES[0] else options.max_samples
+        n_most = FEW_SAMPLES if spare > SPARE_CLEARANCES[0] else options.max_samples
         limited = replace(options, time_limit=left, max_samples=min(n_most, options.max_samples))
         if q_near is not q_start:
             # Which edges from there are free says nothing of those from the start.

@@ -24,7 +24,7 @@ from rrth_planner.timing.parameterization import excess, parameterize, TooFastEr
 
 # Blends are proven with this beyond the margin, so that the timed curve, whose proof has other
 # intervals, does not fail by rounding [m].
-HAIR = 2e-6
+BLEND_CLEARANCE = 2e-6
 # A motion from a moving start may exceed its limits by this factor.
 EXCESS = 1.01
 # Sizes of the first blend of a moving arm, as shares of the free one.
@@ -64,7 +64,7 @@ def time_path(
         path = _straight_on(lead, path)
     if should_stop():
         return CANCELLED
-    rounded = round_corners(path, grown(world, HAIR), limits)
+    rounded = round_corners(path, grown(world, BLEND_CLEARANCE), limits)
     if should_stop():
         return CANCELLED
     choices = [rounded]

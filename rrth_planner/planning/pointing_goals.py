@@ -23,14 +23,14 @@ from rrth_planner.model.joint_range import turns_near
 from rrth_planner.planning.problem import PlanningProblem
 
 # Samples of the joints: few are enough mostly; many before all are reported as not free.
-FEW, MANY = 176, 4096
+FEW_DRAWS, MANY_DRAWS = 176, 4096
 # Half of the most candidates that a caller may ask for.
 MOST_DRAWS = 10**7
 # Shares of a turn round q_near from which joints that turn freely are drawn, too, since few of the
 # draws from a whole turn are near.
 SHARES = (0.5, 0.25)
 # Most goals that are kept, and most configurations in collision.
-MOST, MOST_BLOCKED = 256, 512
+MOST_GOALS, MOST_BLOCKED = 256, 512
 # Goals with a continuous joint the other way round that are kept, at most.
 MOST_TURNED = 64
 # A joint that moves a point of the ray by less than this, in m per rad or m, does not move it.
@@ -184,7 +184,7 @@ def goal_configurations(
         return found
     for share in SHARES:
         near = turns_near(arm, world.bounds, q_near, share)
-        other = _goals_within(arm, goal, world, near, q_near, 2 * FEW)
+        other = _goals_within(arm, goal, world, near, q_near, 2 * FEW_DRAWS)
         if _straight_distance(other, q_near) < _straight_distance(found, q_near):
             found = other
     return _with_other_turns(arm, world, q_near, found)
@@ -195,7 +195,7 @@ def _goals_within(
 ) -> GoalSet:
     """Return what `goal_configurations` does, within bounds, (2, dof) [rad or m]."""
     kernels, dof = pointing_kernels(arm), arm.dof
-    goals, blocked = np.empty((MOST, dof)), np.empty((MOST_BLOCKED, dof))
+    goals, blocked = np.empty((MOST_GOALS, dof)), np.empty((MOST_BLOCKED, dof))
     blocked_reaches = np.empty(MOST_BLOCKED)
     n_free, n_blocked, is_straight = find_goals(
         world.functions,
@@ -244,7 +244,7 @@ def _with_other_turns(arm: ArmModel, world: World, q_near: Array, found: GoalSet
     longest = distances[n_near - 1] if found.n_bent < n_near else np.inf
     order = np.argsort(distances, kind='stable')
     further = [i for i in order[distances[order] < longest] if i >= n_near][:MOST_TURNED]
-    kept = sorted([*range(n_near), *further], key=distances.__getitem__)[:MOST]
+    kept = sorted([*range(n_near), *further], key=distances.__getitem__)[:MOST_GOALS]
     for n, i in enumerate(kept):
         if i >= n_near and world.is_edge_valid(q_near, goals[i]):
             return replace(found, q_goals=goals[kept[: n + 1]], n_bent=n)
@@ -286,9 +286,9 @@ def pointing_problem(
     q_start = float_array(q_start, (arm.dof,), 'q_start', 'rad')
     if goals is None:
         check_pointing_arm(arm)
-        goals = goal_configurations(arm, goal, world, q_start, FEW)
+        goals = goal_configurations(arm, goal, world, q_start, FEW_DRAWS)
         if len(goals.q_goals) == 0:
-            goals = goal_configurations(arm, goal, world, q_start, MANY)
+            goals = goal_configurations(arm, goal, world, q_start, MANY_DRAWS)
     check_type(goals, GoalSet, 'goals')
     bounds = turns_near(arm, world.bounds, q_start, 2.0)
     if bounds is not world.bounds and len(goals.q_goals) > 0:

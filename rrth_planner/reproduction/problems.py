@@ -18,7 +18,11 @@ from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.planning.box_map import map_problem
 from rrth_planner.planning.edge_checks import by_check_points, sampled
-from rrth_planner.planning.pointing_goals import check_pointing_arm, goal_configurations, MANY
+from rrth_planner.planning.pointing_goals import (
+    check_pointing_arm,
+    goal_configurations,
+    MANY_DRAWS,
+)
 from rrth_planner.planning.problem import PlanningProblem
 from rrth_planner.planning.visibility_graph import enters, extended_obstacles, shortest_path
 from rrth_planner.visualization.viewer.examples import example_body
@@ -108,7 +112,7 @@ def _arm_problem(name: str, collision: str) -> NamedProblem:
     arm, scene = load_arm(), example_body('body')
     check_pointing_arm(arm)
     world = arm_world(arm, scene, MARGIN, RAY)
-    goals = goal_configurations(arm, PointingGoal(np.array(target)), world, FOLDED, MANY)
+    goals = goal_configurations(arm, PointingGoal(np.array(target)), world, FOLDED, MANY_DRAWS)
     if len(goals.q_goals) == 0:
         raise SceneError(f'problem "{name}": target {target}, expected one with a free goal')
     problem = PlanningProblem(

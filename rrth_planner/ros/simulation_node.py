@@ -35,7 +35,7 @@ from rrth_planner.ros.middleware.node_process import run_node
 from rrth_planner.ros.middleware.open_subscription import decoded
 from rrth_planner.ros.middleware.qos import COMMITTED
 from rrth_planner.simulation.physics_model import RATE
-from rrth_planner.simulation.simulated_arm import PERIOD
+from rrth_planner.simulation.simulated_arm import STEP_PERIOD
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
@@ -124,9 +124,9 @@ class SimulationNode(Node):
         try:
             while not self._is_over.is_set():
                 self._catch_up()
-                due = self._simulation.time + PERIOD + self._left_out
+                due = self._simulation.time + STEP_PERIOD + self._left_out
                 left = due - self._now()[0]
-                self._is_over.wait(min(max(left, 0.0), PERIOD))
+                self._is_over.wait(min(max(left, 0.0), STEP_PERIOD))
         except Exception:
             # A signal may have ended the context between two statements.
             if rclpy.ok(context=self.context):
@@ -147,7 +147,7 @@ class SimulationNode(Node):
         while not self._is_over.is_set():
             with self._lock:
                 # Of no state that lies in the future.
-                if self._simulation.time + PERIOD + self._left_out > now:
+                if self._simulation.time + STEP_PERIOD + self._left_out > now:
                     return
                 given_up = self._simulation.step()
                 time = self._simulation.time

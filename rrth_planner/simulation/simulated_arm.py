@@ -30,13 +30,14 @@ from rrth_planner.simulation.trajectory_controller import (
 with suppress(ImportError):
     import mujoco
 
-PERIOD = 1.0 / RATE
+# Of the physics and the servos [s].
+STEP_PERIOD = 1.0 / RATE
 # The wearer is placed at every so many steps; until the next time he goes on at his velocity.
-PLACED = 5
+STEPS_PER_PLACE = 5
 # Velocities are differences of encoder positions, smoothed over this time [s].
-SMOOTHING = 0.008
+SMOOTHING_TIME = 0.008
 # A servo that asks for more than this share of its strength is at its limit [-].
-AT_LIMIT = 0.999
+LIMIT_SHARE = 0.999
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,7 +76,7 @@ class Imperfections:
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ArmReading:
     """
-    What is known of the arm after a step, (dof,) each.
+    What is known of the arm after a step; arrays are (dof,) each.
 
     Parameters
     ----------
@@ -87,8 +88,8 @@ class ArmReading:
         Of the motors [N m].
     wanted : ControllerState
         What the controller commands for this time.
-    true_positions, true_velocities : ndarray
-        Without noise.
+    true_positions : ndarray
+        Without noise [rad].
 
     """
 
@@ -102,7 +103,7 @@ class ArmReading:
 
 class SimulatedArm:
     """
-    An arm in the hands of time: each step takes it `PERIOD` further.
+    An arm in the hands of time: each step takes it `STEP_PERIOD` further.
 
     Its time is that of trajectories and stamps; the body is at its first frame at `body_begin`.
     """
@@ -137,7 +138,7 @@ class SimulatedArm:
         self._noise, self._rng = given.encoder_noise, np.random.default_rng(given.seed)
         self.time, self._body_begin = time, body_begin
         self.data.qpos[: arm.dof] = q
-        self._controller = TrajectoryController(q, PERIOD, rules)
+        self._controller = TrajectoryController(q, STEP_PERIOD, rules)
         self._wanted = commanded_state(self.command, time)
         # The newest command last; the servo acts by the first.
         n_late = round(given.command_delay * RATE)
@@ -172,9 +173,9 @@ class SimulatedArm:
         self._controller.receive(points, stamp)
 
     def step(self) -> str | None:
-        """Let `PERIOD` pass; return why a trajectory was given up, if one was."""
+        """Let `STEP_PERIOD` pass; return why a trajectory was given up, if one was."""
         data = self.data
-        if self._n_steps % PLACED == 0:
+        if self._n_steps % STEPS_PER_PLACE == 0:
             self._place_body()
         self._n_steps += 1
         stretch(self.physics, data.qpos)
@@ -196,12 +197,12 @@ class SimulatedArm:
             (self._positions, self._velocities),
             weight,
         )
-        self.n_at_limit += bool((np.abs(effort) > AT_LIMIT * self._max_effort).any())
+        self.n_at_limit += bool((np.abs(effort) > LIMIT_SHARE * self._max_effort).any())
         data.ctrl[:] = effort
         velocities = data.qvel.copy()
         mujoco.mj_step(self.physics.model, data)
         self._follow_contacts(velocities)
-        self.time += PERIOD
+        self.time += STEP_PERIOD
         self._measure()
         given_up = self._controller.given_up
         return given_up and f'{self.arm.joint_names[given_up[0]]}: {given_up[1]}'
@@ -238,7 +239,7 @@ class SimulatedArm:
 
     def _measure(self) -> None:
         before, self._positions = self._positions, self._encoded()
-        rate = (self._positions - before) / PERIOD
-        self._velocities = self._velocities + PERIOD / (PERIOD + SMOOTHING) * (
+        rate = (self._positions - before) / STEP_PERIOD
+        self._velocities = self._velocities + STEP_PERIOD / (STEP_PERIOD + SMOOTHING_TIME) * (
             rate - self._velocities
         )

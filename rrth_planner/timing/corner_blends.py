@@ -13,11 +13,11 @@ from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import MotionLimits
 
 # Largest share of an edge for a blend, so that a straight part remains between two neighbours.
-SHARE = 0.45
+EDGE_SHARE = 0.45
 # Each try is this much smaller than the last, down to the smallest that still saves time [rad].
 SHRINK, SMALLEST = 0.6, 1e-3
 # Least half length of a blend, for corners that hardly turn [rad].
-ENOUGH = 0.01
+LEAST_HALF_LENGTH = 0.01
 # Least divisor of a length.
 TINY = 1e-300
 
@@ -73,7 +73,7 @@ def round_corners(path: Path, world: World, limits: MotionLimits) -> tuple[Blend
     directions = np.diff(q, axis=0) / np.maximum(lengths, TINY)[:, None]
     blends = []
     for i in range(1, len(q) - 1):
-        room = SHARE * min(lengths[i - 1], lengths[i])
+        room = EDGE_SHARE * min(lengths[i - 1], lengths[i])
         whole = Blend(q[i], directions[i - 1], directions[i], float(room))
         blends.append(_largest_free(whole, world, limits))
     return tuple(blends)
@@ -87,7 +87,7 @@ def _largest_free(whole: Blend, world: World, limits: MotionLimits) -> Blend:
         float((0.75 * turn * cap**2 / limits.acceleration).max()),
         float(np.sqrt(1.5 * turn * cap**3 / limits.jerk).max()),
     )
-    half_length = min(whole.half_length, max(enough, ENOUGH))
+    half_length = min(whole.half_length, max(enough, LEAST_HALF_LENGTH))
     while half_length > SMALLEST:
         blend = replace(whole, half_length=half_length)
         curve = blend.coefficients(), *blend.derivative_bounds()

@@ -10,10 +10,10 @@ from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import MotionLimits, piece_coefficients, Trajectory
 from rrth_planner.timing.corner_blends import Blend
 
-# A path shorter than this is no motion: the arm holds still for HOLD seconds [rad, s].
-STILL, HOLD = 1e-9, 0.1
+# A path shorter than this is no motion: the arm holds still for HOLD_TIME seconds [rad, s].
+STILL_LENGTH, HOLD_TIME = 1e-9, 0.1
 # Excess of a limit that is rounding, or the bound between two samples of a piece.
-ALLOWED = 2e-3
+ALLOWED_EXCESS = 2e-3
 # Most attempts to slow a motion down as a whole; its rounding.
 ATTEMPTS, ROUNDING = 5, 1e-4
 
@@ -69,9 +69,9 @@ def parameterize(
         check_type(blend, Blend, 'blends')
     if len(blends) != n_corners:
         raise RrthError(f'blends: {len(blends)}, expected one for each of {n_corners} corners')
-    if path.length < STILL:
+    if path.length < STILL_LENGTH:
         still = np.zeros((2, q.shape[1]))
-        return Trajectory(np.array([0.0, HOLD]), q[[0, 0]], still, still)
+        return Trajectory(np.array([0.0, HOLD_TIME]), q[[0, 0]], still, still)
     half_lengths = np.array([0.0, *(blend.half_length for blend in blends), 0.0])
     most = timed_path.most_points(len(q))
     times, states = np.empty(most), np.empty((3, most, q.shape[1]))
@@ -126,7 +126,7 @@ def limit_ratio(trajectory: Trajectory, limits: MotionLimits) -> float:
     A motion within a limit by `peaks` nowhere exceeds it by more than 0.2 %.
     """
     ratios = enumerate(_ratios(trajectory, limits), start=1)
-    return max((ratio / (1 + ALLOWED)) ** (1 / order) for order, ratio in ratios)
+    return max((ratio / (1 + ALLOWED_EXCESS)) ** (1 / order) for order, ratio in ratios)
 
 
 def excess(trajectory: Trajectory, limits: MotionLimits) -> float:

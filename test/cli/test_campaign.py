@@ -147,7 +147,7 @@ def test_a_campaign_goes_on_after_the_last_plan(plans, folder, two, tmp_path, ca
 def test_batches_of_many_queries_end_within_what_is_there(
     plans, folder, two, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(campaign, 'FEWEST', 4)
+    monkeypatch.setattr(campaign, 'FEWEST_TASKS', 4)
     path, queries = tmp_path / 'plans.parquet', str(folder / 'queries.csv')
     cut(plans, path, 7)
     assert campaign.main([queries, '--output', str(path), '--scheduler', two]) == 0

@@ -3,11 +3,12 @@
 """A bad number of any command is answered by what was expected, and by the unit of its help."""
 
 import argparse
+from importlib import import_module
 import re
 
 import pytest
-from rrth_planner.cli import plain_parsers, ros_parsers
 from rrth_planner.cli.numbers import integer, number, number_of_runs, number_of_workers
+from rrth_planner.cli.parsers import simulate
 from rrth_planner.cli.rrth import COMMANDS
 
 UNIT = re.compile(r'\[([^\]]+)\]')
@@ -26,9 +27,8 @@ def options_of(parser):
 def numbers():
     """Return (command, option) of all that take numbers: whatever reads 1 as one."""
     found = []
-    for name in COMMANDS:
-        parser = getattr(plain_parsers, name, None) or getattr(ros_parsers, name, None)
-        for option in options_of(parser()) if parser else ():
+    for name in (name for name, command in COMMANDS.items() if not command.settings):
+        for option in options_of(import_module(f'rrth_planner.cli.parsers.{name}').parser()):
             if option.type is not None and option.type('1') == 1:
                 found.append(pytest.param(option, id=f'{name} {option.dest}'))
     assert len(found) > 30
@@ -62,7 +62,7 @@ def test_a_number_is_finite_and_above_its_bound():
 
 def test_the_sentence_reaches_the_user(capsys):
     with pytest.raises(SystemExit) as end:
-        ros_parsers.simulate().parse_args(['--lag', '0'])
+        simulate.parser().parse_args(['--lag', '0'])
     assert end.value.code == 2
     said = capsys.readouterr().err.splitlines()[-1]
     assert said.endswith('argument --lag: 0, expected a number > 0 [m]')

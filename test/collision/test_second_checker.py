@@ -136,7 +136,7 @@ def wiggle(rng, arm, scale):
 
 def every_millisecond(trajectory):
     """Return the instants that the checker may look at, and the joint positions there."""
-    n = int(np.ceil(trajectory.duration / second_checker.PERIOD))
+    n = int(np.ceil(trajectory.duration / second_checker.GRID_PERIOD))
     times = np.linspace(0.0, trajectory.duration, n + 1)
     return times, sample(trajectory, times)[0]
 

@@ -17,7 +17,7 @@ from rrth_planner.collision.reference_checker import (
     instants,
     separation_violations,
 )
-from rrth_planner.collision.separation_checker import PERIOD
+from rrth_planner.collision.separation_checker import SAMPLING_PERIOD
 from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.arm import ArmModel, bars_of, Capsule
 from rrth_planner.model.scene import Box, Scene
@@ -130,10 +130,10 @@ def cases(contact_speed):
         # Those that see a wearer of full speed for seconds all violate.
         body = replace(body, speeds=rng.choice([0.0, 0.05, 1.0]) * body.speeds)
         motion = motion_of(rng, arm)
-        every = separation_violations(arm, body, motion, rules, MARGIN, period=PERIOD)
+        every = separation_violations(arm, body, motion, rules, MARGIN, period=SAMPLING_PERIOD)
         times = [violation.time for violation in every]
         assert times == sorted(times)
-        shared = {*np.arange(0.0, motion.duration, PERIOD), motion.duration}
+        shared = {*np.arange(0.0, motion.duration, SAMPLING_PERIOD), motion.duration}
         every = [violation for violation in every if violation.time in shared]
         found.append((arm, body, motion, rules, every))
     return found
@@ -178,7 +178,7 @@ def least_cases(contact_speed):
     body = replace(body, speeds=0.0 * body.speeds)
     while len(found) < 3:
         motion = any_motion(rng)
-        times = np.append(np.arange(0.0, motion.duration, PERIOD), motion.duration)
+        times = np.append(np.arange(0.0, motion.duration, SAMPLING_PERIOD), motion.duration)
         q, v, _ = sample(motion, times)
         everywhere = np.full((len(times), len(body.scene.boxes)), np.inf)
         distances = fast_distances(arm, body.scene, q, v, contact_speed, everywhere)
@@ -186,7 +186,9 @@ def least_cases(contact_speed):
         if 0.002 < least < 1.0:
             i, bar, k = np.unravel_index(distances.argmin(), distances.shape)
             inside = separation_violations(arm, body, motion, rules, least + 1e-3)
-            outside = separation_violations(arm, body, motion, rules, least - 1e-3, period=PERIOD)
+            outside = separation_violations(
+                arm, body, motion, rules, least - 1e-3, period=SAMPLING_PERIOD
+            )
             assert max(violation.depth for violation in inside) >= 1e-3 - 1e-9
             assert not outside
             place = bars_of(arm)[bar].name, body.scene.boxes[k].name

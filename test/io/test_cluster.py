@@ -43,7 +43,7 @@ def _client():
 
 
 def test_results_come_in_order_and_few_are_handed_out_ahead(client, monkeypatch):
-    monkeypatch.setattr(cluster, 'AHEAD', 3)
+    monkeypatch.setattr(cluster, 'TASKS_AHEAD', 3)
     handed = []
 
     def batches():
@@ -87,7 +87,7 @@ def test_a_task_that_ends_its_workers_is_a_sentence():
 
 
 def test_no_scheduler_and_no_worker_are_sentences(monkeypatch):
-    monkeypatch.setattr(cluster, 'PATIENCE', 0.3)
+    monkeypatch.setattr(cluster, 'LONGEST_IDLE', 0.3)
     with (
         dask.config.set({'distributed.comm.timeouts.connect': '1s'}),
         pytest.raises(RrthError, match='^scheduler tcp://127.0.0.1:1: .*; expected the address'),

@@ -374,7 +374,7 @@ def test_links_that_pass_each_other_closely_get_capsules_that_do(tmp_path, monke
     assert collision_shares(found.arm, 500)['plate', 'wheel'] < 0.05
     assert colliding_pairs(found.arm, 500) == ()
     # As every link is enclosed, these two always collide, and would be let.
-    monkeypatch.setattr(link_capsules, 'OFTEN', 2.0)
+    monkeypatch.setattr(link_capsules, 'OFTEN_SHARE', 2.0)
     usual, of_usual = imported(file, tool='lamp')
     assert colliding_pairs(usual.arm, 500) == (('plate', 'wheel'),)
     assert len(flesh.capsules) > len(of_usual.capsules)
@@ -386,7 +386,7 @@ def test_links_that_truly_always_collide_keep_their_capsules(tmp_path, monkeypat
     file = urdf_file(tmp_path, links, joints)
     found, flesh = imported(file, tool='lamp')
     assert colliding_pairs(found.arm, 500) == (('plate', 'wheel'),)
-    monkeypatch.setattr(link_capsules, 'OFTEN', 2.0)
+    monkeypatch.setattr(link_capsules, 'OFTEN_SHARE', 2.0)
     _, usual = imported(file, tool='lamp')
     for one, other in zip(flesh.capsules, usual.capsules, strict=True):
         assert one.radius == other.radius and np.array_equal(one.ends, other.ends)

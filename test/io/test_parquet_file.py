@@ -21,7 +21,7 @@ def rows(first, end):
 
 
 def test_rows_are_added_at_the_end_in_groups_of_bounded_size(tmp_path, monkeypatch):
-    monkeypatch.setattr(parquet_file, 'GROUP', 7)
+    monkeypatch.setattr(parquet_file, 'GROUP_ROWS', 7)
     path = tmp_path / 'folder' / 'rows.parquet'
     for first in range(0, 20, 5):
         append_table(path, rows(first, first + 5))

@@ -11,7 +11,7 @@ from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.planning.pointing_goals import (
     goal_configurations,
-    MOST,
+    MOST_GOALS,
     pointing_kernels,
     spreading_ratios,
     target_in_mount,
@@ -161,5 +161,5 @@ def test_no_more_goals_are_kept_than_there_is_room_for():
     while world.is_valid(q_near):
         q_near = rng.uniform(*world.bounds)
     goals = goal_configurations(arm, PointingGoal([1.2, 0.4, 0.3]), world, q_near, 2000)
-    assert len(goals.q_goals) == goals.n_bent == MOST
+    assert len(goals.q_goals) == goals.n_bent == MOST_GOALS
     assert (np.diff(np.linalg.norm(goals.q_goals - q_near, axis=1)) >= 0.0).all()

@@ -27,7 +27,7 @@ from rrth_planner.model.rotation import (
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.planning.options import RRTHOptions
-from rrth_planner.planning.pointing_goals import FEW, goal_configurations
+from rrth_planner.planning.pointing_goals import FEW_DRAWS, goal_configurations
 from rrth_planner.planning.problem import PlanningProblem
 from rrth_planner.timing.corner_blends import round_corners
 from worlds import (
@@ -374,9 +374,9 @@ def test_values_of_another_number_of_joints_do_not_reach_a_kernel(n):
         lambda: certify(still, world),
         lambda: least_clearance(still, world),
         lambda: round_corners(Path([q, q, q]), world, limits()),
-        lambda: goal_configurations(table_1_arm(), goal, world, q, FEW),
-        lambda: goal_configurations(other, goal, world, q, FEW),
-        lambda: goal_configurations(other, goal, world, FOLDED, FEW),
+        lambda: goal_configurations(table_1_arm(), goal, world, q, FEW_DRAWS),
+        lambda: goal_configurations(other, goal, world, q, FEW_DRAWS),
+        lambda: goal_configurations(other, goal, world, FOLDED, FEW_DRAWS),
     ):
         rejects(RrthError, ask, 'shape')
 

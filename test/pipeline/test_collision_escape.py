@@ -16,8 +16,8 @@ from rrth_planner.collision.penetration import (
     box_depths,
     escape_depths,
     half_widths,
-    INTERVALS,
     leads_out,
+    N_INTERVALS,
     relaxed,
 )
 from rrth_planner.collision.reference_checker import bar_box_contact, first_contact
@@ -31,7 +31,7 @@ from rrth_planner.model.path import Path
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import MotionState, positions_at, sample, StartState
-from rrth_planner.pipeline.plan_path import SPARES
+from rrth_planner.pipeline.plan_path import SPARE_CLEARANCES
 from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.timing.parameterization import parameterize
 from worlds import (
@@ -235,7 +235,7 @@ def test_an_arm_that_the_wearer_leaned_into_comes_out_and_stays_out(seed):
     times = np.union1d(np.arange(0.0, trajectory.duration, 1e-3), [out, trajectory.duration])
     q, v, _ = sample(trajectory, times)
     assert (np.abs(v) <= limits().velocity * 1.001).all()
-    looks = np.linspace(0.0, out, INTERVALS + 1)
+    looks = np.linspace(0.0, out, N_INTERVALS + 1)
     for box, is_entered in zip(scene.boxes, is_in, strict=True):
         is_hit = collides(arm, box, q, MARGIN)
         assert not is_hit[times >= out].any()
@@ -452,7 +452,7 @@ def test_no_shorter_escape_is_found_by_trying_many(seed):
         arm, scene, q_start, _ = leaned_case(seed, 0.01, 0.045)
     plan = ask(arm, scene, q_start)
     way = plan.path.waypoints[1] - q_start
-    roomy = grown(arm_world(arm, scene, MARGIN, RAY), SPARES[0])
+    roomy = grown(arm_world(arm, scene, MARGIN, RAY), SPARE_CLEARANCES[0])
     assert roomy.is_valid(q_start + way)
     rng, length = np.random.default_rng(0), np.linalg.norm(way)
     aside = rng.normal(size=(3000, 4)) * np.repeat([0.1, 0.3, 3.0], 1000)[:, None]

@@ -21,7 +21,12 @@ from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import MotionState, sample, StartState
 from rrth_planner.pipeline.rejection import goal_rejection
 from rrth_planner.planning.options import RRTHOptions
-from rrth_planner.planning.pointing_goals import FEW, GoalSet, MANY, target_in_mount
+from rrth_planner.planning.pointing_goals import (
+    FEW_DRAWS,
+    GoalSet,
+    MANY_DRAWS,
+    target_in_mount,
+)
 from rrth_planner.timing.lead_in import lead_in
 from worlds import (
     dense_touch,
@@ -299,8 +304,8 @@ def test_a_reserve_costs_no_motion_and_few_draws_of_goals(answers, monkeypatch):
     for scene, q_start, target, before in answers:
         draws.append([])
         assert ask(scene, q_start, target, reserve=0.05).status is before.status
-    assert max(row.count(FEW) for row in draws) > len(path_planning.SPARES)
-    assert max(row.count(MANY) for row in draws) == len(path_planning.SPARES)
+    assert max(row.count(FEW_DRAWS) for row in draws) > len(path_planning.SPARE_CLEARANCES)
+    assert max(row.count(MANY_DRAWS) for row in draws) == len(path_planning.SPARE_CLEARANCES)
 
 
 def test_a_request_that_is_cancelled_gives_no_motion(answers):

@@ -14,7 +14,7 @@ from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.trajectory import sample, Trajectory
 from rrth_planner.pipeline import time_path as path_timing
 from rrth_planner.pipeline.request import PlanQuestion
-from rrth_planner.pipeline.time_path import HAIR, time_path
+from rrth_planner.pipeline.time_path import BLEND_CLEARANCE, time_path
 from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.planning.planner import plan
 from rrth_planner.planning.problem import PlanningProblem
@@ -63,7 +63,7 @@ def test_a_corner_without_room_is_a_stop_and_no_failure():
     n_sharp = 0
     # One in twenty has such a corner.
     for path in paths_without_room():
-        blends = round_corners(path, grown(WORLD, HAIR), limits())
+        blends = round_corners(path, grown(WORLD, BLEND_CLEARANCE), limits())
         sharp = [blend.corner for blend in blends if blend.half_length == 0.0]
         motion = timed(path)
         assert isinstance(motion, Trajectory)

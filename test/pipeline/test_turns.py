@@ -28,7 +28,7 @@ from rrth_planner.planning.options import (  # noqa: E402
     RRTStarOptions,
 )
 from rrth_planner.planning.pointing_goals import (  # noqa: E402
-    FEW,
+    FEW_DRAWS,
     goal_configurations,
     pointing_problem,
 )
@@ -291,7 +291,7 @@ def test_goals_are_of_the_nearest_turn_and_the_nearest_comes_first():
     near = np.where(FREE, HALF, arm.bounds[1])
     for q in free_starts(arm, scene, rng, 5, -near, near) + TURN * FREE:
         world, goal = arm_world(arm, scene, MARGIN, RAY), PointingGoal(rng.uniform(-1.5, 1.5, 3))
-        goals = goal_configurations(arm, goal, world, q, FEW)
+        goals = goal_configurations(arm, goal, world, q, FEW_DRAWS)
         if len(goals.q_goals) == 0:
             continue
         distances = np.linalg.norm(goals.q_goals - q, axis=1)

@@ -96,13 +96,13 @@ def test_more_goals_than_a_tree_has_roots_for_are_planned_to(kind):
 
 
 def test_no_more_goals_are_kept_than_there_is_room_for(monkeypatch):
-    monkeypatch.setattr(pointing_goals, 'MOST', 2)
+    monkeypatch.setattr(pointing_goals, 'MOST_GOALS', 2)
     monkeypatch.setattr(pointing_goals, 'MOST_BLOCKED', 3)
     world, rng = wearer_world(), np.random.default_rng(80)
     n_goals, n_blocked = set(), set()
     for target in rng.uniform((-1.0, -1.0, -1.0), (1.5, 1.0, 1.0), (40, 3)):
         found = pointing_goals.goal_configurations(
-            table_1_arm(), PointingGoal(target), world, FOLDED, pointing_goals.MANY
+            table_1_arm(), PointingGoal(target), world, FOLDED, pointing_goals.MANY_DRAWS
         )
         n_goals.add(len(found.q_goals))
         n_blocked.add(len(found.q_blocked))

@@ -223,7 +223,7 @@ class Tracker(Node):
 def start(monkeypatch):
     """Return a function that starts a node and its tracker, which run until the test ends."""
     # Each test that waits for diagnostics would wait for a second.
-    monkeypatch.setattr(tracker_reporter, 'PERIOD', 0.1)
+    monkeypatch.setattr(tracker_reporter, 'DIAGNOSTICS_PERIOD', 0.1)
     running = []
 
     def started(*arguments, **parameters):

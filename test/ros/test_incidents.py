@@ -36,7 +36,7 @@ from rrth_planner.ros.messages.error_codes import CODE_OF_STATUS  # noqa: E402
 from rrth_planner.ros.requests import incidents, plan_request  # noqa: E402
 from rrth_planner.timing.fast_stop import fast_stop  # noqa: E402
 import samples  # noqa: E402
-from test_planner_node import _start, inputs_of, say_all  # noqa: E402, F401
+from stranger import _start, inputs_of, say_all  # noqa: E402, F401
 
 pytestmark = pytest.mark.usefixtures('ros_context')
 ROOT = Path(__file__).parent.parent.parent

@@ -31,7 +31,7 @@ from rrth_planner.ros.playback_node import PlaybackNode  # noqa: E402
 from samples import array, box, command, FOLDED, JOINTS, joints, target, wearer  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
-from test_planner_node import (  # noqa: E402, F401
+from stranger import (  # noqa: E402, F401
     _start,
     inputs_of,
     LATCHED,

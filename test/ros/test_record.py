@@ -25,8 +25,8 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy  # noqa: E402
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores  # noqa: E402
 from rrth_planner.cli import record  # noqa: E402
+from rrth_planner.cli.parsers.record import TOPICS  # noqa: E402
 from rrth_planner.cli.plot import main as plot  # noqa: E402
-from rrth_planner.cli.ros_parsers import TOPICS  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.ros.client.recording_reader import RecordingReader  # noqa: E402
 from rrth_planner.ros.messages.definitions import definition_of, type_name, type_of_name  # noqa: E402

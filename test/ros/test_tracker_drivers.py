@@ -16,7 +16,7 @@ from conftest import spinning, wait_until  # noqa: E402
 from geometry_msgs.msg import Pose  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.qos import QoSProfile, ReliabilityPolicy  # noqa: E402
-from rrth_planner.cli import ros_parsers  # noqa: E402
+from rrth_planner.cli.parsers import wearer as wearer_parser  # noqa: E402
 from rrth_planner.io.motion_capture_file import load_person  # noqa: E402
 from rrth_planner.io.skeleton_file import load_skeleton  # noqa: E402
 from rrth_planner.model.separation import governing_speed, SeparationRules  # noqa: E402
@@ -65,7 +65,7 @@ def seen_as(name):
 @pytest.mark.usefixtures('messages')
 @pytest.mark.parametrize('driver', DRIVERS)
 def test_the_stand_in_of_each_driver_is_a_wearer_for_the_node(driver):
-    assert set(ros_parsers.DRIVERS) == set(DRIVERS)
+    assert set(wearer_parser.DRIVERS) == set(DRIVERS)
     it, said, seen = DRIVERS[driver], [], []
     topic = 'skeletons' if it.input == 'zed' else it.input
     source = ['-p', f'skeleton:={it.skeleton}', '-p', f'input:={it.input}']

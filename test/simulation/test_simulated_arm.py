@@ -13,7 +13,7 @@ from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.simulation.mechanics import usual_mechanics
 from rrth_planner.simulation.moving_body import body_of_scenes, standing_body
 from rrth_planner.simulation.servo import servo_for_lag
-from rrth_planner.simulation.simulated_arm import Imperfections, PERIOD
+from rrth_planner.simulation.simulated_arm import Imperfections, STEP_PERIOD
 from rrth_planner.simulation.tool_speed import top_tool_speed
 from rrth_planner.simulation.trajectory_controller import (
     ControllerRules,
@@ -50,7 +50,7 @@ def test_the_tool_lags_by_the_time_that_was_wished(lag):
     readings = stepped(simulation, 1.3)
     errors = np.array([r.wanted.positions - r.true_positions for r in readings[500:]])[:, 0]
     # A step lies between what was commanded and the state after it.
-    assert errors.mean() / 1.2 + PERIOD == pytest.approx(wished, rel=0.05, abs=PERIOD)
+    assert errors.mean() / 1.2 + STEP_PERIOD == pytest.approx(wished, rel=0.05, abs=STEP_PERIOD)
     # And by so much at its place, at the speed of the tool.
     now = readings[-1]
     apart = tool_pose(ARM, now.wanted.positions)[:3, 3] - tool_pose(ARM, now.true_positions)[:3, 3]
@@ -191,7 +191,7 @@ def test_a_body_that_moves_into_an_arm_that_stands_still_pushes_it_away_at_its_s
     assert event.first.speed == pytest.approx(0.8, rel=0.05)
     assert event.first.approach == pytest.approx(0.8, rel=0.1)
     # The hand went as it was recorded, and the arm had to yield.
-    expected = tool + (PERIOD * np.arange(1, 401)[:, None] - 0.4) * velocity
+    expected = tool + (STEP_PERIOD * np.arange(1, 401)[:, None] - 0.4) * velocity
     np.testing.assert_allclose(places, expected, atol=2e-3)
     assert np.abs(simulation.reading.true_positions - q).max() > 0.2
     assert event.greatest_force > 10.0

@@ -8,7 +8,7 @@ import pytest
 from rrth_planner.collision.world import arm_world
 from rrth_planner.model.path import Path
 from rrth_planner.model.scene import Scene
-from rrth_planner.timing.corner_blends import Blend, round_corners, SHARE
+from rrth_planner.timing.corner_blends import Blend, EDGE_SHARE, round_corners
 from worlds import (
     dense_touch,
     examples,
@@ -123,7 +123,7 @@ def test_rounded_corners_are_free_and_fit_their_edges():
     for path in corners(71, 60):
         (blend,) = round_corners(path, world, limits())
         lengths = np.linalg.norm(np.diff(path.waypoints, axis=0), axis=1)
-        assert 0.0 <= blend.half_length <= SHARE * lengths.min() + 1e-12
+        assert 0.0 <= blend.half_length <= EDGE_SHARE * lengths.min() + 1e-12
         assert np.array_equal(blend.corner, path.waypoints[1])
         if blend.half_length > 0.0:
             n_rounded += 1
@@ -141,7 +141,7 @@ def test_with_nothing_in_the_way_every_corner_is_rounded_as_far_as_full_speed_ne
         top = min(
             (bounds.velocity / np.abs(u).clip(1e-9)).min() for u in (blend.u_in, blend.u_out)
         )
-        is_whole = blend.half_length == pytest.approx(SHARE * lengths.min())
+        is_whole = blend.half_length == pytest.approx(EDGE_SHARE * lengths.min())
         assert is_whole or top_speed(blend, bounds) == pytest.approx(top, rel=1e-6)
 
 

@@ -21,7 +21,7 @@ from rrth_planner.execution.separation_status import (  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.model.scene import Scene  # noqa: E402
 from rrth_planner.visualization.viewer.live_page import LivePage, STATE_COLOURS  # noqa: E402
-from rrth_planner.visualization.viewer.panel import PERIOD, RateChart, SPAN  # noqa: E402
+from rrth_planner.visualization.viewer.panel import CHART_PERIOD, CHART_SPAN, RateChart  # noqa: E402
 from rrth_planner.visualization.viewer.scene_view import TIMED  # noqa: E402
 import sample_motions  # noqa: E402
 
@@ -70,14 +70,14 @@ def test_the_chart_shows_the_least_rates_of_the_last_seconds(server):
         chart = RateChart(folder, server.gui)
     assert chart.plot is None
     for k in range(3):
-        chart.draw((0.9, 0.2, 0.7)[k], 0.4 * k * PERIOD)
-    chart.draw(0.8, 1.2 * PERIOD)
+        chart.draw((0.9, 0.2, 0.7)[k], 0.4 * k * CHART_PERIOD)
+    chart.draw(0.8, 1.2 * CHART_PERIOD)
     times, rates = chart.plot.data
-    np.testing.assert_allclose(times, [-1.2 * PERIOD, 0.0])
+    np.testing.assert_allclose(times, [-1.2 * CHART_PERIOD, 0.0])
     assert rates.tolist() == [0.9, 0.2]
-    for now in np.arange(1.0, 2.0 * SPAN, 1.01 * PERIOD):
+    for now in np.arange(1.0, 2.0 * CHART_SPAN, 1.01 * CHART_PERIOD):
         chart.draw(1.0, now)
         times, rates = chart.plot.data
-        assert -SPAN <= times[0] <= times[-1] == 0.0
+        assert -CHART_SPAN <= times[0] <= times[-1] == 0.0
     assert (np.diff(times) > 0.0).all()
     assert rates.min() == 1.0

@@ -12,7 +12,7 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import ModelError, shown
 
 # What collides in the middle of all joint ranges and in so many configurations always does.
-ALWAYS = 0.95
+ALWAYS_SHARE = 0.95
 Pair = tuple[str, str]
 
 
@@ -28,7 +28,10 @@ def colliding_pairs(arm: ArmModel, n_samples: int = 2000) -> tuple[Pair, ...]:
     bars, ends, places = _bars_at(arm, _samples(arm, n_samples))
     for names, pairs in places.items():
         # Few collide in the middle, so that few are looked at in all configurations.
-        if _collide(bars, ends[:1], pairs).all() and _collide(bars, ends, pairs).mean() > ALWAYS:
+        if (
+            _collide(bars, ends[:1], pairs).all()
+            and _collide(bars, ends, pairs).mean() > ALWAYS_SHARE
+        ):
             found.append(names)
     return tuple(found)
 

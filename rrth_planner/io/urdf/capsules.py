@@ -30,7 +30,7 @@ HOPELESS = 1.2
 # Between so many planes along each axis slabs begin and end.
 N_PLANES = 11
 # Axes of a greater cosine are one.
-SAME = 0.995
+SAME_AXIS_COSINE = 0.995
 # How far chosen planes are moved, in turn, in spacings of the planes.
 SHIFTS = np.array([0.5, 0.25, 0.125])
 # Radii that are tried, as multiples of the least one: a thicker capsule may be shorter.
@@ -388,7 +388,7 @@ def _axes_to_cut(triangles: Array) -> Array:
     principal = _principal_axes(_extreme(triangles.reshape(-1, 3), N_COARSE))
     axes: list[Array] = []
     for axis in (*np.eye(3), *np.linalg.eigh(scatter)[1].T, *principal):
-        if all(abs(axis @ other) < SAME for other in axes):
+        if all(abs(axis @ other) < SAME_AXIS_COSINE for other in axes):
             axes.append(axis)
     return np.array(axes)
 

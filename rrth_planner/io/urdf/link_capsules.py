@@ -24,7 +24,7 @@ USUAL = Fit(slack=0.02, most=4)
 CLOSER = (Fit(slack=0.01, most=8, worth=0.02), Fit(slack=0.02, most=4, power=8.0))
 # Two links often collide where they do so in more than this share of random configurations. A
 # closer fit is taken where it reduces that share to less than this part of it.
-OFTEN, LESS = 0.25, 0.7
+OFTEN_SHARE, CLOSER_SHARE = 0.25, 0.7
 N_SAMPLES = 500
 # Between two positions at which a joint beside the chain is looked at [rad].
 BRANCH_STEP = 0.5
@@ -152,7 +152,9 @@ def _closer_fits(
     shares = collision_shares(with_capsules(found, usual.capsules, 0.0).arm, N_SAMPLES)
     links = {capsule.name for capsule in usual.capsules}
     often = {
-        pair: share for pair, share in shares.items() if share > OFTEN and links.issuperset(pair)
+        pair: share
+        for pair, share in shares.items()
+        if share > OFTEN_SHARE and links.issuperset(pair)
     }
     names = {name for pair in often for name in pair}
     fits: dict[str, Fit] = {}
@@ -174,7 +176,7 @@ def _closer_fits(
             # A link that lies in the capsules of another one has none of its own.
             results[both] = collision_shares(arm, N_SAMPLES).get(pair, 1.0), len(capsules)
         best = min(results, key=lambda both: results[both])
-        if results[best][0] < LESS * share:
+        if results[best][0] < CLOSER_SHARE * share:
             fits |= zip(pair, best, strict=True)
     return fits
 

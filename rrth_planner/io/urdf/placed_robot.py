@@ -29,7 +29,7 @@ with suppress(ImportError):
     import yourdfpy
 
 # A joint of the URDF this near to that of the arm is the same one [m, rad].
-SAME = 2e-3
+SAME_JOINT = 2e-3
 # The types of joints that have an axis.
 MOVING = ('revolute', 'continuous', 'prismatic')
 
@@ -181,7 +181,7 @@ def _fitted(lines: tuple[Array, Array], places: tuple[Array, Array]) -> Array | 
     shift, *_ = np.linalg.lstsq(across.reshape(-1, 3), wanted, rcond=None)
     off = np.abs(across.reshape(-1, 3) @ shift - wanted).max()
     tilt = np.abs(directions @ rotation.T - axes).max()
-    if not max(off, tilt) < SAME:
+    if not max(off, tilt) < SAME_JOINT:
         return None
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = rotation, shift

@@ -4,13 +4,27 @@
 
 import math
 
+from numba import types
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
 from rrth_planner.kernels import scratch
 from rrth_planner.kernels.collision.arm_validity import BARS_ROOM, curvature_bounds, ENDS_ROOM
 from rrth_planner.kernels.collision.bar_box import bar_box_distance
 from rrth_planner.kernels.collision.boxes import may_meet, rows_of
-from rrth_planner.kernels.jit import CHAIN, CUBE, kernel, MAT, OUT_MAT, OUT_VEC, READ_INTS, VEC
+from rrth_planner.kernels.jit import (
+    ARM,
+    as_chain,
+    BODY,
+    CHAIN,
+    CUBE,
+    kernel,
+    MAT,
+    OUT_MAT,
+    OUT_VEC,
+    POINTS,
+    READ_INTS,
+    VEC,
+)
 from rrth_planner.kernels.layout import (
     BAR_SIZE,
     BOX_HALF,
@@ -26,21 +40,19 @@ from rrth_planner.kernels.trajectory.quintics import bound, fit
 
 # Intervals that a motion is first cut into are no longer than this [s], and are halved so often
 # before the proof gives up: 0.05 ms.
-FIRST, HALVINGS = 0.0128, 8
+LONGEST_INTERVAL, HALVINGS = 0.0128, 8
 # Rounding of a speed [m/s].
 AT_REST = 1e-9
 # Sections that a bar is cut into for the permitted rate, instants of a stop that are looked at; up
 # to when that matters [s].
 SECTIONS, INSTANTS, LATEST = 8, 8, 10.0
 # Steps of the search for the permitted rate; the time between two places of a difference [s].
-STEPS, STEP = 6, 1e-4
+RATE_HALVINGS, DIFFERENCE_TIME = 6, 1e-4
 # Smallest velocities that are divided by [rad/s].
 TINY, SLOW = 1e-6, 1e-3
 
-# A wearer as he was seen: boxes (m, 15), allowed (m,) and T_arm_base (4, 4) as for
-# `boxes.rows_of`, by how much each box is grown at time 0 (m,) [m], and its greatest speed (m,)
-# [m/s].
-BODY = (MAT, READ_INTS, MAT, VEC, VEC)
+# Greatest velocities, accelerations and jerks of the joints.
+LIMITS = types.UniTuple(VEC, 3)
 
 
 @kernel(void(MAT, float64, float64, OUT_MAT), is_inner=True)
@@ -174,40 +186,20 @@ def blocking_box(
     return -1
 
 
-@kernel(
-    int64(
-        *(VEC, MAT, MAT, MAT, float64, float64),
-        *(READ_INTS, CHAIN, MAT, *BODY, MAT, MAT, OUT_VEC),
-    ),
-    is_short=True,
-)
-def first_blocked(
-    times,
-    positions,
-    velocities,
-    accelerations,
-    begin,
-    contact,
-    bodies,
-    chain,
-    robot,
-    boxes,
-    allowed,
-    T_arm_base,
-    growths,
-    speeds,
-    quartic,
-    cubic,
-    found,
-):
+@kernel(int64(POINTS, float64, float64, ARM, BODY, MAT, MAT, OUT_VEC), is_short=True)
+def first_blocked(points, begin, contact, arm, body, quartic, cubic, found):
     """
     Return -1 where a motion is proven separate from a moving wearer, else bar * m + box.
 
-    times (n,) [s], positions, velocities and accelerations (n, dof), n > 1: points of the motion,
-    of which only what comes after `begin` counts. The rest: as for `BODY` and `blocking_box`.
-    found (2,): begin and end of the interval that is not proven [s]. Intervals are halved until
-    each is proven; conservative advancement to both sides of their middles.
+    points: `Points` of the motion, of which only what comes after `begin` counts [s]; arm, body:
+    `Arm`, `Body`. The rest as for `blocking_box`. found (2,): begin and end of the interval that
+    is not proven [s]. Intervals are halved until each is proven; conservative advancement to both
+    sides of their middles.
     """
+    times, positions, velocities, accelerations = points
+    address, robot, bodies = arm
+    boxes, allowed, T_arm_base, growths, speeds = body
+    chain = as_chain(address)
     n_pieces, dof = positions.shape[0] - 1, positions.shape[1]
     curves, part = np.empty((n_pieces, 6, dof)), np.empty((6, dof))
     rows = np.empty((BOX_ROWS, boxes.shape[0]))
@@ -216,7 +208,7 @@ def first_blocked(
     for i in range(n_pieces):
         length = times[i + 1] - times[i]
         share = min(max(0.0, (begin - times[i]) / length), 1.0)
-        n_parts = max(1, math.ceil((1.0 - share) * length / FIRST - 1e-9))
+        n_parts = max(1, math.ceil((1.0 - share) * length / LONGEST_INTERVAL - 1e-9))
         smallest = (1.0 - share) / n_parts / 2.0**HALVINGS
         left = share
         step = (1.0 - share) / n_parts
@@ -349,44 +341,28 @@ def is_rate_safe(rate, place, v, gains, a, j, step, latest, ends, contact, n_bar
 
 
 @kernel(
-    void(
-        *(CUBE, VEC, VEC, int64, float64, VEC, VEC, VEC, VEC, float64),
-        *(READ_INTS, CHAIN, MAT, *BODY, OUT_MAT),
-    ),
+    void(CUBE, VEC, VEC, int64, float64, LIMITS, LIMITS, float64, ARM, BODY, OUT_MAT),
     is_short=True,
 )
 def permitted_rates(
-    curves,
-    times,
-    places,
-    n_rates,
-    reserve,
-    acceleration,
-    jerk,
-    stop_acceleration,
-    stop_jerk,
-    contact,
-    bodies,
-    chain,
-    robot,
-    boxes,
-    allowed,
-    T_arm_base,
-    growths,
-    speeds,
-    found,
+    curves, times, places, n_rates, reserve, limits, stop_limits, contact, arm, body, found
 ):
     """
     Write the greatest rates at some places of a motion from which a stop would keep clear.
 
     curves (n, 6, dof), times (n + 1,): the motion; places (m,): times within it, evenly spread
     [s], of which the first n_rates are asked for; reserve: how many times a rate must be safe, to
-    be permitted; acceleration, jerk, stop_acceleration, stop_jerk
-    (dof,): limits of the motion and of a stop; growths (m,): of the boxes when a stop begins. The
-    rest as for `BODY` and `first_blocked`. found (n_rates, 3): the rate, up to 1, and how fast the
-    rate may change there: its first and its second derivative that the limits of the motion allow
-    [1/s, 1/s^2]. It makes a motion smooth, and proves nothing.
+    be permitted; limits, stop_limits: greatest velocities, accelerations and jerks of the motion
+    and of a stop, (dof,) each; body: `Body`, its growths those when a stop begins. The rest as for
+    `first_blocked`. found (n_rates, 3): the rate, up to 1, and how fast the rate may change there:
+    its first and its second derivative that the limits of the motion allow [1/s, 1/s^2]. It makes
+    a motion smooth, and proves nothing.
     """
+    _, acceleration, jerk = limits
+    _, stop_acceleration, stop_jerk = stop_limits
+    address, robot, bodies = arm
+    boxes, allowed, T_arm_base, growths, speeds = body
+    chain = as_chain(address)
     dof, n_bars, m = curves.shape[2], bodies.shape[0], places.shape[0]
     q, nearby, state = np.empty(dof), np.empty(dof), np.empty((4, dof))
     points, other = scratch.floats(ENDS_ROOM), scratch.floats(ENDS_ROOM)
@@ -401,7 +377,7 @@ def permitted_rates(
         slowest, joint, slows, fades = 0.0, 0, math.inf, math.inf
         for k in range(dof):
             v = abs(state[1, k])
-            q[k], nearby[k] = state[0, k], state[0, k] + STEP * state[1, k]
+            q[k], nearby[k] = state[0, k], state[0, k] + DIFFERENCE_TIME * state[1, k]
             takes = stop_time(v, stop_acceleration[k], stop_jerk[k])
             if takes > slowest:
                 slowest, joint = takes, k
@@ -426,7 +402,7 @@ def permitted_rates(
                 for c in range(3):
                     p = BAR_SIZE * bar + 4 * end + c
                     square += (other[p] - points[p]) ** 2
-                ends[i, 2 * bar + end] = math.sqrt(square) / STEP + flesh
+                ends[i, 2 * bar + end] = math.sqrt(square) / DIFFERENCE_TIME + flesh
         latest_times(points, bodies, dof, robot, rows, growths, speeds, latest[i])
     for i in range(n_rates):
         v, gains, a, j = stops[i, 0], stops[i, 1], stops[i, 2], stops[i, 3]
@@ -434,7 +410,7 @@ def permitted_rates(
         if is_rate_safe(reserve, i, v, gains, a, j, step, latest, ends, contact, n_bars):
             low = 1.0
         else:
-            for _ in range(STEPS):
+            for _ in range(RATE_HALVINGS):
                 middle = 0.5 * (low + high)
                 rate = reserve * middle
                 if is_rate_safe(rate, i, v, gains, a, j, step, latest, ends, contact, n_bars):

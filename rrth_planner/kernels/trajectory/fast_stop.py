@@ -24,7 +24,7 @@ from rrth_planner.kernels.vectors import copy
 
 # First window of the search, in durations of a stop on a line; its growth; greatest length of a
 # cell [s], and greatest number of cells, which has priority.
-AHEAD, FURTHER, CELL, MOST_CELLS = 3.0, 4.0, 0.01, 256
+FIRST_WINDOW, WINDOW_GROWTH, LONGEST_CELL, MOST_CELLS = 3.0, 4.0, 0.01, 256
 # Shares of the limits that are tried: at first a little more than 1, since the motion may itself
 # be at a limit when the stop begins; less where the points of the stop exceed the limits.
 RESERVES = (1.003, 0.985, 0.95, 0.85)
@@ -87,7 +87,7 @@ def first_window(curves, times, time, limits):
     derivatives_on(curves, times, piece, time, state)
     for k in range(curves.shape[2]):
         ramp = (limits[1, k] + abs(state[2, k])) / limits[2, k]
-        window = max(window, AHEAD * (abs(state[1, k]) / limits[1, k] + ramp))
+        window = max(window, FIRST_WINDOW * (abs(state[1, k]) / limits[1, k] + ramp))
     return window
 
 
@@ -121,9 +121,11 @@ def write_fast_stop(curves, times, now, lead, velocity, acceleration, jerk, poin
     end, begin = times[rest], avoid_points(times, now + lead)
     window = 0.0
     while begin + window < end:
-        window = FURTHER * window if window > 0.0 else first_window(curves, times, begin, limits)
+        window = (
+            WINDOW_GROWTH * window if window > 0.0 else first_window(curves, times, begin, limits)
+        )
         until = min(begin + window, end)
-        step = max(CELL, (until - now) / MOST_CELLS)
+        step = max(LONGEST_CELL, (until - now) / MOST_CELLS)
         # A piece of the motion may end with a shorter cell, and so may the lead.
         most = int((until - now) / step) + points_between(times, now, until) + 3
         rows, pieces = np.empty((most + 1, 4)), np.empty(most, np.int64)

@@ -33,7 +33,7 @@ POWERS = ((1, 1), (0, 1), (1, 0), (-1, 1), (1, -1))
 # the end of the stop that was tried last.
 ENDS, ROW, DECELERATION, JERK, TRIED = range(5)
 # What every stop that is tried needs: all but its row and shares.
-AHEAD = (MAT, CUBES, READ_INTS, int64, MAT, float64, OUT_VEC, OUT_MAT, OUT_MAT)
+STOP_TYPES = (MAT, CUBES, READ_INTS, int64, MAT, float64, OUT_VEC, OUT_MAT, OUT_MAT)
 
 
 @kernel(float64(float64, float64, float64, float64, float64, OUT_MAT))
@@ -120,7 +120,7 @@ def keeps_limits(phases, rows, geometry, pieces, first, n, reserve):
     return True
 
 
-@kernel(void(int64, float64, float64, *AHEAD), is_inner=True)
+@kernel(void(int64, float64, float64, *STOP_TYPES), is_inner=True)
 def try_stop(
     row, deceleration, jerk, rows, geometry, pieces, n, limits, reserve, best, phases, tried
 ):

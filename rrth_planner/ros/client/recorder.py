@@ -17,7 +17,7 @@ from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscript
 # Size of the chunks written; a recorder that is killed loses no more [bytes].
 CHUNK = 128 * 1024
 # How often topics of unknown type are searched for [s].
-PERIOD = 0.2
+SEARCH_PERIOD = 0.2
 
 
 class RecordingFile:
@@ -119,7 +119,7 @@ class Recorder(Node):
             if topic in known:
                 self._add_topic(topic, known[topic])
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = self.create_timer(PERIOD, self._find_missing, clock=steady)
+        self._timer = self.create_timer(SEARCH_PERIOD, self._find_missing, clock=steady)
 
     def check(self) -> None:
         """Raise what ends the recording."""

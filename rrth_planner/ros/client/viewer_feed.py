@@ -42,7 +42,7 @@ SERVICE = f'{PLANNER}/plan'
 # Longest wait for the acknowledgement of a target [s].
 LONGEST_WAY = 1.0
 # From an answer to the next request: by then the arm is in motion; period of the timer [s].
-PAUSE, PERIOD = 0.3, 0.02
+REQUEST_PAUSE, TIMER_PERIOD = 0.3, 0.02
 
 
 class ViewerFeed(Node):
@@ -87,10 +87,10 @@ class ViewerFeed(Node):
         self._is_asking, self._is_wanted = False, False
         self._newest: Array | None = None
         self._asked: Future | None = None
-        self._answer, self._answered = '', -PAUSE
+        self._answer, self._answered = '', -REQUEST_PAUSE
         # Not the node's clock: simulated time may stand still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = self.create_timer(PERIOD, self._on_timer, clock=steady)
+        self._timer = self.create_timer(TIMER_PERIOD, self._on_timer, clock=steady)
 
     @property
     def scene(self) -> Scene:
@@ -142,7 +142,7 @@ class ViewerFeed(Node):
             # No answer comes from a planner that has ended.
             self._client.remove_pending_request(self._asked)
             self._conclude('the planner has ended without an answer')
-        is_soon = time.monotonic() < self._answered + PAUSE
+        is_soon = time.monotonic() < self._answered + REQUEST_PAUSE
         with self._lock:
             if not self._is_wanted or self._is_asking or is_soon or not is_ready:
                 return

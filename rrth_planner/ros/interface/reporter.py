@@ -26,7 +26,7 @@ from rrth_planner.ros.messages.error_codes import answer
 from rrth_planner.ros.middleware.qos import LATCHED
 
 # Diagnostics are published at least this often [s].
-PERIOD = 1.0
+DIAGNOSTICS_PERIOD = 1.0
 # From the best level to the worst.
 SEVERITY = (
     DiagnosticStatus.OK,
@@ -115,7 +115,7 @@ class Reporter:
         # Not the node's clock: simulated time may stand still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timers = [
-            node.create_timer(PERIOD, self._publish, clock=steady),
+            node.create_timer(DIAGNOSTICS_PERIOD, self._publish, clock=steady),
             node.create_timer(SHORTEST_PERIOD, self._publish_changes, clock=steady),
         ]
 

@@ -13,7 +13,7 @@ from rrth_planner.ros.messages.diagnostics import status_to_msg
 from rrth_planner.ros.messages.fields import NANOSECONDS
 
 # Diagnostics are published so often, and rejections are logged at most so often [s].
-PERIOD, WARNING_PERIOD = 1.0, 5.0
+DIAGNOSTICS_PERIOD, WARNING_PERIOD = 1.0, 5.0
 
 
 def because(doubts: tuple[str, ...]) -> str:
@@ -48,7 +48,7 @@ class TrackerReporter:
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
         # Not the node's clock: simulated time may stand still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = node.create_timer(PERIOD, self._publish, clock=steady)
+        self._timer = node.create_timer(DIAGNOSTICS_PERIOD, self._publish, clock=steady)
 
     def received(self) -> None:
         """Count a message, or what TF had."""

@@ -23,7 +23,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 # So many answers of a service leave in such a period [s]: clients keep ten that they have not
 # taken yet, those to others included, and a busy machine may not run them for half a second.
-FEW, PERIOD = 2, 0.1
+MOST_AT_ONCE, SENDING_PERIOD = 2, 0.1
 # A client that was not there for so long [s] has left, or was never found.
 LONGEST_ABSENCE = 5.0
 # Of more answers that wait the first one leaves at once.
@@ -88,7 +88,7 @@ class _Line:
         readers: Readers | None = None
         n_gone, present = 0, time.monotonic()
         while self._waiting and (
-            len(self._sent) < FEW or len(self._waiting) + len(self._absent) > MOST_WAITING
+            len(self._sent) < MOST_AT_ONCE or len(self._waiting) + len(self._absent) > MOST_WAITING
         ):
             answer = self._waiting.popleft()
             if readers is None:
@@ -133,7 +133,7 @@ class Answers:
 
     Fast DDS waits 100 ms for the reader of a client that has left, and rclpy holds the
     interpreter's lock meanwhile. So an answer leaves once the reader of its client is known to be
-    there. What a client has taken, since it asked again after it, does not count in `FEW`.
+    there. `MOST_AT_ONCE` leaves out what a client has taken, since it asked again after it.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ class Answers:
         self._lines: dict[str, _Line] = {}
         # Not the node's clock: simulated time may stand still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = node.create_timer(PERIOD, self._on_period, clock=steady)
+        self._timer = node.create_timer(SENDING_PERIOD, self._on_period, clock=steady)
         self._timer.cancel()
         for service in node.services:
             self._serve(service)

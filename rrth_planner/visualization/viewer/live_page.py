@@ -13,7 +13,8 @@ from rrth_planner.visualization.viewer.panel import Panel
 from rrth_planner.visualization.viewer.scene_view import SceneView
 import viser
 
-FRAME = 1.0 / 30.0
+# Of the picture [s].
+FRAME_PERIOD = 1.0 / 30.0
 # Colours of a motion that is slowed down or stopped for a wearer who moves, by the state.
 STATE_COLOURS = {'SLOWED': (232, 138, 32), 'PROTECTIVE_STOP': (209, 50, 70), 'FAULT': (30, 30, 30)}
 
@@ -39,7 +40,7 @@ class LivePage:
         """Draw the messages until the thread is interrupted."""
         while True:
             self.draw()
-            time.sleep(FRAME)
+            time.sleep(FRAME_PERIOD)
 
     def draw(self) -> None:
         """Draw what has changed."""

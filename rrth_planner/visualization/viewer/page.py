@@ -21,7 +21,7 @@ from rrth_planner.visualization.viewer.scene_view import SceneView
 import viser
 
 # Frame period of a playing motion, and longest sleep of an idle page [s].
-FRAME, NAP = 1.0 / 30.0, 0.5
+FRAME_PERIOD, LONGEST_SLEEP = 1.0 / 30.0, 0.5
 
 
 class ViewerPage:
@@ -68,7 +68,7 @@ class ViewerPage:
                 is_playing = self._player.is_playing
             before = now
             self.draw()
-            self._wake.wait(FRAME if is_playing else NAP)
+            self._wake.wait(FRAME_PERIOD if is_playing else LONGEST_SLEEP)
             self._wake.clear()
 
     def draw(self) -> None:

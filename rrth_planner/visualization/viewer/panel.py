@@ -31,7 +31,7 @@ GOOD, BAD = '#14804a', '#b3261e'
 SPEEDS = ('0.1', '0.25', '0.5', '1')
 MOST_SEEDS, STEP_SIZES, MOST_MARGIN, FARTHEST = 99, (0.05, 1.5), 0.1, 5.0
 # What the chart shows [s], and how long after each other it is drawn [s].
-SPAN, PERIOD = 20.0, 0.1
+CHART_SPAN, CHART_PERIOD = 20.0, 0.1
 STROKE = '#3b6fb6'
 
 
@@ -76,7 +76,7 @@ def _page(title: str, colour: str, sentence: str, rows: list[tuple[Any, str]]) -
 
 
 class RateChart:
-    """The rate of the last SPAN seconds, from 0 to 1; there is no chart until there is a rate."""
+    """The rate of the last `CHART_SPAN` seconds, 0 to 1; no chart until there is a rate."""
 
     def __init__(self, folder: viser.GuiFolderHandle, gui: viser.GuiApi) -> None:
         """Create nothing yet; the chart appears in the folder."""
@@ -89,11 +89,11 @@ class RateChart:
     def draw(self, rate: float, now: float) -> None:
         """Draw the rate that is permitted now [s]."""
         self._least = min(self._least, rate)
-        if self._rates and now < self._rates[-1][0] + PERIOD:
+        if self._rates and now < self._rates[-1][0] + CHART_PERIOD:
             return
         self._rates.append((now, self._least))
         self._least = np.inf
-        while self._rates[0][0] < now - SPAN:
+        while self._rates[0][0] < now - CHART_SPAN:
             self._rates.popleft()
         times, rates = np.array(self._rates).T
         data = (times - now, rates)
@@ -106,7 +106,7 @@ class RateChart:
                 ({'label': 'time [s]'}, {'label': 'rate [-]', 'stroke': STROKE, 'width': 2.0}),
                 title='rate of the motion [-], last 20 s',
                 scales={
-                    'x': {'time': False, 'range': (-SPAN, 0.0)},
+                    'x': {'time': False, 'range': (-CHART_SPAN, 0.0)},
                     'y': {'range': (0.0, 1.05)},
                 },
                 legend={'show': False},

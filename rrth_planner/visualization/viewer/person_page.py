@@ -23,9 +23,10 @@ from rrth_planner.wearer.recorded_person import posture_at, RecordedPerson
 from rrth_planner.wearer.skeleton import Skeleton
 import viser
 
-FRAME = 1.0 / 30.0
+# Of the picture [s].
+FRAME_PERIOD = 1.0 / 30.0
 # Where the planner found no motion it is asked again after this time [s].
-PAUSE = 0.2
+RETRY_PAUSE = 0.2
 
 
 class PersonPage:
@@ -78,14 +79,14 @@ class PersonPage:
         while True:
             now = time.monotonic()
             self.draw(now - begin)
-            time.sleep(max(0.0, now + FRAME - time.monotonic()))
+            time.sleep(max(0.0, now + FRAME_PERIOD - time.monotonic()))
 
     def run_for(self, span: float) -> None:
         """Draw for a time [s]."""
         begin = time.monotonic()
         while (now := time.monotonic() - begin) < span:
             self.draw(now)
-            time.sleep(FRAME)
+            time.sleep(FRAME_PERIOD)
 
     def draw(self, now: float) -> None:
         """Move wearer and arm to a time [s], and draw them."""
@@ -126,7 +127,7 @@ class PersonPage:
         self.panel.say(response.sentence)
         plan = response.plan
         if plan is None or plan.trajectory is None:
-            self._next = now + PAUSE
+            self._next = now + RETRY_PAUSE
             return
         motion = ExecutingMotion(
             trajectory=plan.trajectory,
