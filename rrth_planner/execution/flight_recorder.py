@@ -27,7 +27,7 @@ from rrth_planner.model.scene import Scene, scene_of_bytes
 
 # How long it remembers, and after how long it keeps what is known by then [s].
 MEMORY, SEGMENT = 30.0, 1.0
-# What a file begins with, and how a command is told from others [bytes].
+# What a file begins with, and how long the digest of a command is [bytes].
 MAGIC, DIGEST = b'rrth flight 1\n', 16
 # A longer file is none of this [bytes].
 LONGEST = 2**28
@@ -233,7 +233,7 @@ class _Reader(pickle.Unpickler):
 
 
 def digest_of(command: Command) -> bytes:
-    """Return by what a command is told from all others: its motion, to the bit, and its begin."""
+    """Return the digest of a command: of its motion, to the bit, and its begin."""
     motion = command.motion.trajectory
     digest = hashlib.blake2b(repr(command.begin).encode(), digest_size=DIGEST)
     for array in (motion.times, *motion.states):

@@ -34,7 +34,7 @@ from rrth_planner.simulation.trajectory_controller import (
 
 # Periods of joint states and of the monitor's checks [s].
 JOINT_PERIOD, CHECK_PERIOD = 0.01, 0.02
-# Where parts will be is told from two sights that are so far apart [s].
+# Where parts will be follows from two sights that are so far apart [s].
 STEADY, LATELY = 0.08, 0.25
 # Virtual time begins then [s]: stamps are positive.
 BEGIN = 1000.0

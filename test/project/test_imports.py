@@ -34,7 +34,7 @@ MAY = {
     'ros': 'kernels model collision planning timing execution pipeline wearer io simulation',
     'reproduction': 'kernels model collision planning io visualization',
     'cli': 'kernels model collision planning timing execution pipeline wearer io visualization '
-    'simulation ros reproduction',
+    'simulation rehearsal ros reproduction',
 }
 # Within `ros`, each package imports only itself and those before it.
 ROS_ROOMS = ('messages', 'middleware', 'interface', 'monitor', 'requests', 'client')
