@@ -27,6 +27,7 @@ from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.joint_reading import JointReading
 from rrth_planner.execution.separation_status import SeparationState, SeparationStatus
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.frozen import changed
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.separation import Separation
 from rrth_planner.model.trajectory import part_of, positions_at, Trajectory
@@ -108,7 +109,7 @@ class Sent:
         """Return it by a clock that was set forward by a step [s]."""
         start = self.commitment.start_time + step
         return Sent(
-            replace(self.commitment, start_time=start), self.motion.shifted(step), self.lead
+            changed(self.commitment, start_time=start), self.motion.shifted(step), self.lead
         )
 
 
@@ -241,7 +242,7 @@ def observe(
         is_new = bool((places_of(known.body.scene, scene) < 0).any())
         body = seen_again(known.body, scene, measured, separation.rules)
         is_news = known.is_news or is_new or bool(body.faster)
-    return replace(known, body=body, is_news=is_news, came=now, period=period)
+    return changed(known, body=body, is_news=is_news, came=now, period=period)
 
 
 def begin(
@@ -260,7 +261,7 @@ def begin(
     if isinstance(found, Blocked):
         return found
     sent = _sent(found, planned, lead)
-    return replace(
+    return changed(
         known,
         planned=planned,
         replaced=known.planned,
@@ -278,22 +279,22 @@ def begin(
 
 def end(known: Commitments) -> Commitments:
     """Forget the running motion."""
-    return replace(known, planned=None, sent=None, replaced=None, rest=None)
+    return changed(known, planned=None, sent=None, replaced=None, rest=None)
 
 
 def hold(known: Commitments, until: float) -> Commitments:
     """Let the newest commitment be the last one until a time [s]."""
-    return replace(known, held_until=until)
+    return changed(known, held_until=until)
 
 
 def fail(known: Commitments, why: str) -> Commitments:
     """Let no motion begin until a reset."""
-    return replace(known, fault=why)
+    return changed(known, fault=why)
 
 
 def reset(known: Commitments) -> Commitments:
     """Allow motions again after a fault, and one that came to rest on its way to go on."""
-    return replace(known, fault='', is_reset=True)
+    return changed(known, fault='', is_reset=True)
 
 
 def shift(known: Commitments, step: float) -> Commitments:
@@ -302,7 +303,7 @@ def shift(known: Commitments, step: float) -> Commitments:
     # The newest is one of them, as a rule.
     pairs = zip(known.recent, recent, strict=True)
     found = next((after for before, after in pairs if before is known.sent), None)
-    return replace(
+    return changed(
         known,
         planned=known.planned and known.planned.shifted(step),
         replaced=known.replaced and known.replaced.shifted(step),
@@ -350,7 +351,7 @@ def note_rest(
     if reading is None:
         return known, False
     if reading.is_moving(reading.taken, rules.rest_speed):
-        return known if known.rest is None else replace(known, rest=None), False
+        return known if known.rest is None else changed(known, rest=None), False
     if known.is_active:
         place, after = _commanded(known, reading.taken), IGNORED_AFTER
     else:
@@ -362,7 +363,7 @@ def note_rest(
         and float(np.abs(place - then).max()) > IGNORED_WAY
         and float(np.abs(place - reading.positions).max()) > ASIDE
     )
-    return known if known.rest else replace(known, rest=(since, then)), is_ignored
+    return known if known.rest else changed(known, rest=(since, then)), is_ignored
 
 
 def has_moved(
@@ -385,12 +386,12 @@ def check_news(known: Commitments, now: float) -> Commitments:
     if not known.has_lost_proof:
         return known
     assert known.sent is not None
-    return replace(known, is_news=not is_separate(known, known.sent.motion, now))
+    return changed(known, is_news=not is_separate(known, known.sent.motion, now))
 
 
 def note_took(known: Commitments, took: float) -> Commitments:
     """Take note of how long it took from a body to its commitment [s]."""
-    return replace(known, took=max(min(took, LATEST), FADING * known.took))
+    return changed(known, took=max(min(took, LATEST), FADING * known.took))
 
 
 def extend(
@@ -409,7 +410,7 @@ def extend(
     has_changed = found is not known
     if found.fault:
         return Extension(found, None, None, has_changed)
-    return replace(_extended(found, now, is_clear), has_changed=has_changed)
+    return changed(_extended(found, now, is_clear), has_changed=has_changed)
 
 
 def _extended(known: Commitments, now: float, is_clear: Callable[[Trajectory], bool]) -> Extension:
@@ -426,11 +427,11 @@ def _extended(known: Commitments, now: float, is_clear: Callable[[Trajectory], b
     if is_at_rest and not present.is_whole and not _may_resume(known, now, rules):
         if rules.is_manual:
             waits = SeparationStatus(SeparationState.PROTECTIVE_STOP, 'waits for ~/reset', 0.0)
-            return replace(as_before, status=waits)
+            return changed(as_before, status=waits)
         return as_before
     if is_in_sharp_stop(present, start, separation):
         blocked = known.blocked_by if known.blocked >= present.start_time else None
-        return replace(as_before, status=status_of(blocked, rate_at(known, now), True))
+        return changed(as_before, status=status_of(blocked, rate_at(known, now), True))
     elapsed = start - present.start_time
     if present.is_whole:
         known = check_news(known, now)
@@ -438,8 +439,8 @@ def _extended(known: Commitments, now: float, is_clear: Callable[[Trajectory], b
             part_of(present.trajectory, elapsed, present.trajectory.duration)
         ):
             # From here on the motion is given in stretches.
-            present = replace(present, stretch=elapsed)
-    as_before = replace(as_before, commitments=known)
+            present = changed(present, stretch=elapsed)
+    as_before = changed(as_before, commitments=known)
     seen = body_at(body, start, separation.rules)
     found = extended(present, start, seen, _stretched(known, separation), is_clear)
     if found is None:
@@ -447,8 +448,8 @@ def _extended(known: Commitments, now: float, is_clear: Callable[[Trajectory], b
     if isinstance(found, Blocked):
         is_stopping = now - present.start_time > present.stretch
         status = status_of(found, rate_at(known, now), is_stopping)
-        known = replace(known, blocked=now, blocked_by=found)
-        return replace(as_before, commitments=known, status=status)
+        known = changed(known, blocked=now, blocked_by=found)
+        return changed(as_before, commitments=known, status=status)
     joins = sent.lead + elapsed
     begins = begin_of(now, rules.controller_delay)
     lead = lead_in(sent.motion.trajectory, joins - (start - begins), joins)
@@ -462,7 +463,7 @@ def _extended(known: Commitments, now: float, is_clear: Callable[[Trajectory], b
         dropped = 1 if recent[0].commitment.is_whole else 0
         recent = (*recent[:dropped], *recent[dropped + 1 :])
     # A reset counts for the stop that it follows, and no later one.
-    following = replace(known, sent=sent, recent=(*recent, sent), is_news=False, is_reset=False)
+    following = changed(known, sent=sent, recent=(*recent, sent), is_news=False, is_reset=False)
     rate = 1.0 if found.is_whole else float(path_state(found, start)[1])
     return Extension(known, following, status_of(None, rate, False), False)
 
@@ -536,7 +537,7 @@ def _find_present(known: Commitments, reading: JointReading | None) -> Commitmen
         reading.taken, rest_speed
     )
     if is_at_rest:
-        reading = replace(reading, positions=reading.mean_positions(rest_speed))
+        reading = changed(reading, positions=reading.mean_positions(rest_speed))
     aside, nearer = (ASIDE_AT_REST, NEARER_AT_REST) if is_at_rest else (ASIDE, NEARER)
     gap = np.inf
     # What was commanded until then, by all of them in turn.
@@ -551,11 +552,11 @@ def _find_present(known: Commitments, reading: JointReading | None) -> Commitmen
     if gaps[k] >= nearer * gap:
         return known
     # What has come since it was proven, and since later ones were, counts again.
-    found = replace(known, sent=begun[k], recent=(begun[k],), is_news=True)
+    found = changed(known, sent=begun[k], recent=(begun[k],), is_news=True)
     if known.planned is None or begun[k].commitment.motion is known.planned.trajectory:
         return found
     # It is of the motion before that.
-    return replace(found, planned=known.replaced, replaced=None)
+    return changed(found, planned=known.replaced, replaced=None)
 
 
 def _commanded(known: Commitments, time: float) -> Array:
@@ -584,7 +585,7 @@ def _gap(commitment: Commitment, reading: JointReading, time_ago: float) -> floa
 
 def _sent(commitment: Commitment, planned: ExecutingMotion, lead: Trajectory) -> Sent:
     """Return a commitment as it is sent, with what is commanded before it."""
-    motion = replace(
+    motion = changed(
         planned,
         trajectory=commitment.trajectory,
         start_time=commitment.start_time,

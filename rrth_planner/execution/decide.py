@@ -41,7 +41,6 @@ with that stop pending.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 import math
 from typing import Any
@@ -86,8 +85,11 @@ from rrth_planner.execution.watch import (
     MOST_IGNORED,
     recorded,
     Watch,
+    with_commitments,
+    with_tracked,
 )
 from rrth_planner.model.errors import RequestError
+from rrth_planner.model.frozen import changed
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.status import ErrorCode
 from rrth_planner.model.trajectory import Trajectory
@@ -154,7 +156,7 @@ def _begun(watch: Watch, event: events.Begin) -> Decision:
     lead = _lead_in(watch, event)
     watch, commanded = _first_commanded(watch, event, lead)
     delay, rest_speed = rules.controller_delay, rules.rest_speed
-    watch = replace(
+    watch = changed(
         watch,
         rules=rules,
         goal=event.goal,
@@ -204,7 +206,7 @@ def _first_commanded(
     """
     known = watch.commitments
     if event.rules.separation is None:
-        return replace(watch, commitments=given.end(known)), led(lead, event.planned)
+        return changed(watch, commitments=given.end(known)), led(lead, event.planned)
     if known.fault:
         raise RequestError(
             ErrorCode.FAILURE,
@@ -224,17 +226,17 @@ def _first_commanded(
     assert found.sent is not None
     rate = given.rate_at(found, found.sent.commitment.start_time)
     status = given.status_of(None, rate, False)
-    return replace(watch, commitments=found, separation=status), found.sent.motion
+    return changed(watch, commitments=found, separation=status), found.sent.motion
 
 
 def _body_came(watch: Watch, event: events.BodyCame) -> Decision:
     at, separation = event.at, event.at.rules.separation
     known = watch.commitments
-    if separation is None:
-        known = replace(known, body=None)
-    elif event.sight is not None:
+    if separation is None and known.body is not None:
+        known = changed(known, body=None)
+    elif separation is not None and event.sight is not None:
         known = given.observe(known, event.sight.scene, event.sight.measured, separation, at.now)
-    watch = replace(watch, commitments=known)
+    watch = with_commitments(watch, known)
     if event.look is None or watch.running is None:
         return Decision(watch=watch)
     return _looked(watch, at, event.look)
@@ -265,31 +267,35 @@ def _checked(watch: Watch, at: Moment, look: Look, phase: float) -> Decision:
     if is_free and is_soon_free:
         # So far the arm keeps clear of where he will be; so must what it is given next.
         is_clear = _always if is_escaping else partial(_is_soon_clear, watch, expected)
-        found = _extended(replace(watch, in_the_way_since=None), at, is_clear)
+        if watch.in_the_way_since is not None:
+            watch = changed(watch, in_the_way_since=None)
+        found = _extended(watch, at, is_clear)
         found = _without_news(found, events.StopFor(at, NOT_SEPARATE, scene, phase, at.now))
-        return replace(found, age=look.age, is_free=True)
+        return changed(found, age=look.age, is_free=True)
     if watch.in_the_way_since is None:
-        watch = replace(watch, in_the_way_since=at.now)
+        watch = changed(watch, in_the_way_since=at.now)
     stop = events.StopFor(at, why, scene, phase, at.now)
     if not _may_go_on(watch, at, phase, scene):
         return Decision(watch=watch, age=look.age, next=stop)
     found = _extended(watch, at, partial(_is_clear, watch, scene, expected))
     # The whole rest of the motion has no stop ahead of him.
     if found.watch.commitments.is_whole:
-        found = replace(found, next=stop)
+        found = changed(found, next=stop)
     if found.otherwise is not None and found.otherwise.watch.commitments.is_whole:
-        found = replace(found, otherwise=replace(found.otherwise, next=stop))
-    return replace(found, age=look.age)
+        found = changed(found, otherwise=changed(found.otherwise, next=stop))
+    return changed(found, age=look.age)
 
 
 def _without_news(found: Decision, stop: events.StopFor) -> Decision:
     """Stop the arm where news of the wearer leave the whole rest of its motion unproven."""
     if found.otherwise is not None:
         # What is published is proven.
-        return replace(found, otherwise=_without_news(found.otherwise, stop))
+        return changed(found, otherwise=_without_news(found.otherwise, stop))
     known = given.check_news(found.watch.commitments, stop.at.now)
-    watch = replace(found.watch, commitments=known)
-    return replace(found, watch=watch, next=stop if known.has_lost_proof else None)
+    if known is found.watch.commitments and not known.has_lost_proof:
+        return found
+    watch = with_commitments(found.watch, known)
+    return changed(found, watch=watch, next=stop if known.has_lost_proof else None)
 
 
 def _remaining(watch: Watch, phase: float, now: float) -> tuple[ExecutingMotion, float]:
@@ -339,7 +345,7 @@ def _always(_: Trajectory) -> bool:
 def _is_clear(watch: Watch, scene: Scene, expected: Scene, curve: Trajectory) -> bool:
     """Return whether a stretch and its stop are free of the wearer, now and soon."""
     assert watch.running is not None
-    motion = replace(watch.running, trajectory=curve, escape_time=0.0)
+    motion = changed(watch.running, trajectory=curve, escape_time=0.0)
     is_free = holds(watch, is_remaining_free, motion, 0.0, scene)
     return is_free and _is_soon_clear(watch, expected, curve)
 
@@ -347,7 +353,7 @@ def _is_clear(watch: Watch, scene: Scene, expected: Scene, curve: Trajectory) ->
 def _is_soon_clear(watch: Watch, expected: Scene, curve: Trajectory) -> bool:
     """Return whether a stretch and all its stop are free of where the wearer will be soon."""
     assert watch.running is not None
-    motion = replace(watch.running, trajectory=curve, target_distance=0.0, escape_time=0.0)
+    motion = changed(watch.running, trajectory=curve, target_distance=0.0, escape_time=0.0)
     return not expected.boxes or holds(watch, is_remaining_free, motion, 0.0, expected)
 
 
@@ -358,17 +364,17 @@ def _extended(watch: Watch, at: Moment, is_clear: IsClear = _always) -> Decision
     planned = watch.commitments.planned
     found = given.extend(watch.commitments, at.now, at.reading, is_clear)
     # As long as nothing is published.
-    same = replace(watch, commitments=found.commitments)
+    same = with_commitments(watch, found.commitments)
     if found.has_changed and found.commitments.sent is not None:
-        same = replace(same, tracked=track_next(same.tracked, found.commitments.sent.motion))
+        same = changed(same, tracked=track_next(same.tracked, found.commitments.sent.motion))
     if found.next is None:
         if found.status is not None:
-            same = replace(same, separation=found.status)
+            same = changed(same, separation=found.status)
         decision = Decision(watch=same)
     else:
         assert found.next.sent is not None and found.status is not None
         motion = found.next.sent.motion
-        longer = replace(
+        longer = changed(
             same,
             commitments=found.next,
             tracked=track_next(watch.tracked, motion),
@@ -388,9 +394,9 @@ def _switched(decision: Decision, is_latest: bool) -> Decision:
     watch = entered(watch, MonitorState.MONITORING, SWITCHED[is_latest], level)
     if not is_latest:
         watch = ignored(watch, 'arm ignored the last commanded motion')
-    return replace(
+    return changed(
         decision,
-        watch=replace(watch, is_ignored=not is_latest),
+        watch=changed(watch, is_ignored=not is_latest),
         otherwise=decision.otherwise and _switched(decision.otherwise, is_latest),
         lines=(*decision.lines, Line(Level.ERROR, SWITCHED[is_latest])),
     )
@@ -432,9 +438,8 @@ def _stopped(watch: Watch, event: events.StopFor) -> Decision:
 
 def _ticked(watch: Watch, event: events.Tick) -> Decision:
     at = event.at
-    found = Decision(
-        watch=replace(watch, tracked=check_command(watch.tracked, at.reading, at.now, at.steady))
-    )
+    tracked = check_command(watch.tracked, at.reading, at.now, at.steady)
+    found = Decision(watch=with_tracked(watch, tracked))
     if watch.state is not MonitorState.IDLE:
         for step in (stops.repeated_stop, _checked_previous, _checked_ignored):
             found = followed_by(found, partial(_at, step, at))
@@ -458,7 +463,7 @@ def _checked_previous(watch: Watch, at: Moment) -> Decision:
     tracked = track_previous(watch.tracked, at.reading)
     if tracked is watch.tracked:
         return Decision(watch=watch)
-    found = Decision(watch=replace(watch, tracked=tracked), is_look_due=True)
+    found = Decision(watch=changed(watch, tracked=tracked), is_look_due=True)
     return _switched(found, tracked.is_latest)
 
 
@@ -469,7 +474,7 @@ def _checked_ignored(watch: Watch, at: Moment) -> Decision:
         return Decision(watch=watch)
     rules = watch.rules
     known, is_ignored = given.note_rest(watch.commitments, reading, running, rules.execution)
-    watch = replace(watch, commitments=known)
+    watch = with_commitments(watch, known)
     if not is_ignored:
         return Decision(watch=_followed(watch, at))
     has_moved = given.has_moved(known, reading, running, rules.rest_speed)
@@ -483,12 +488,12 @@ def _checked_ignored(watch: Watch, at: Moment) -> Decision:
         # One that is only late would execute all of it.
         stop = stop_of(watch, at, running, 0.0)
         command = stops.command_of(watch, stop)
-        watch = replace(watch, tracked=track_stop(watch.tracked, stop))
+        watch = changed(watch, tracked=track_stop(watch.tracked, stop))
     watch = ignored(watch, NOT_FOLLOWED, has_moved)
     found = _given_up(watch, at, NOT_FOLLOWED, watch.n_ignored < MOST_IGNORED)
     watch = _ended(found.watch)
-    watch = replace(watch, tracked=forget_command(watch.tracked))
-    return replace(found, watch=watch, command=command)
+    watch = with_tracked(watch, forget_command(watch.tracked))
+    return changed(found, watch=watch, command=command)
 
 
 def _followed(watch: Watch, at: Moment) -> Watch:
@@ -538,10 +543,10 @@ def _phase(watch: Watch, at: Moment) -> tuple[Decision, float | None]:
             if watch.is_ignored:
                 is_replanned = known.is_active and watch.n_ignored < MOST_IGNORED
                 found = _given_up(watch, at, NOT_FOLLOWED, is_replanned)
-        return replace(found, watch=_ended(found.watch)), None
+        return changed(found, watch=_ended(found.watch)), None
     phase = tracked_phase(watch.tracked, at.reading, at.now)
     if phase is not None:
-        watch = replace(watch, tracked=find(watch.tracked, at.now))
+        watch = with_tracked(watch, find(watch.tracked, at.now))
         if watch.sentence == OFF_TRAJECTORY:
             is_stopping = watch.state is MonitorState.STOPPING
             watch = entered(watch, watch.state, watch.stop_reason if is_stopping else '')
@@ -570,7 +575,7 @@ def _given_up(watch: Watch, at: Moment, why: str, is_replanned: bool = True) -> 
     assert running is not None
     sentence = f'{why}: motion given up'
     state = MonitorState.STOPPING if is_replanned else MonitorState.HOLDING
-    watch = entered(replace(watch, stop_reason=why, n_stops=watch.n_stops + 1), state, sentence)
+    watch = entered(changed(watch, stop_reason=why, n_stops=watch.n_stops + 1), state, sentence)
     watch = stops.failed(watch, why, is_fault=False)
     watch = recorded(watch, running.trajectory, None, at.rules, is_replanned)
     return Decision(watch=watch, lines=(Line(Level.WARN, sentence),))
@@ -578,14 +583,14 @@ def _given_up(watch: Watch, at: Moment, why: str, is_replanned: bool = True) -> 
 
 def _ended(watch: Watch) -> Watch:
     """Return it without a motion that has ended, or was given up."""
-    watch = replace(
+    watch = changed(
         watch,
         tracked=track_nothing(watch.tracked),
         commitments=given.end(watch.commitments),
         pending=None,
     )
     if watch.is_monitoring:
-        watch = replace(followed(watch), has_arrived=True, is_ignored=watch.is_ignored)
+        watch = changed(followed(watch), has_arrived=True, is_ignored=watch.is_ignored)
     if watch.state is MonitorState.STOPPING and watch.is_held:
         return entered(watch, MonitorState.HOLDING, watch.sentence, watch.stop_level)
     if watch.state is MonitorState.HOLDING:
@@ -608,7 +613,7 @@ def _clock_stepped(watch: Watch, event: events.ClockStepped) -> Decision:
     """
     at, step = event.at, event.step
     since = watch.in_the_way_since
-    watch = replace(
+    watch = changed(
         watch,
         tracked=shifted(watch.tracked, step),
         commitments=given.shift(watch.commitments, step),
@@ -628,20 +633,20 @@ def _clock_stepped(watch: Watch, event: events.ClockStepped) -> Decision:
         phase = stops.phase_or_elapsed(watch, at, running)
         if phase is not None and phase < running.trajectory.duration:
             stop = stop_of(watch, at, running, phase)
-            watch = replace(watch, tracked=track_stop_again(watch.tracked, stop))
+            watch = changed(watch, tracked=track_stop_again(watch.tracked, stop))
             command = Command(stop, 0.0, watch.rules)
-            return replace(found, watch=watch, command=command, otherwise=found)
+            return changed(found, watch=watch, command=command, otherwise=found)
     fail = events.Fail(at, event.sentence, is_replanned=True, is_fault=False)
     return followed_by(found, lambda watch: _failed(watch, fail))
 
 
 def _reset(watch: Watch, _: events.Reset) -> Decision:
     fault, waiting = watch.commitments.fault, watch.waiting
-    watch = replace(watch, commitments=given.reset(watch.commitments), waiting=None)
+    watch = changed(watch, commitments=given.reset(watch.commitments), waiting=None)
     if waiting is not None and waiting.n_motions == watch.n_motions:
         # A motion that was stopped, and waits, goes on.
-        watch = replace(watch, stops=(*watch.stops, waiting), is_held=False)
-    return Decision(watch=replace(watch, separation=SeparationStatus()) if fault else watch)
+        watch = changed(watch, stops=(*watch.stops, waiting), is_held=False)
+    return Decision(watch=changed(watch, separation=SeparationStatus()) if fault else watch)
 
 
 def _rested(watch: Watch, event: events.Rest) -> Decision:
@@ -655,7 +660,7 @@ def _rested(watch: Watch, event: events.Rest) -> Decision:
 
 def _held(watch: Watch, event: events.Hold) -> Decision:
     known = given.hold(watch.commitments, event.until)
-    return Decision(watch=replace(watch, commitments=known))
+    return Decision(watch=with_commitments(watch, known))
 
 
 def _unheard(watch: Watch, _: events.NobodyListens) -> Decision:
@@ -667,11 +672,11 @@ def _unheard(watch: Watch, _: events.NobodyListens) -> Decision:
 
 def _took(watch: Watch, event: events.CommitmentTook) -> Decision:
     known = given.note_took(watch.commitments, event.took)
-    return Decision(watch=replace(watch, commitments=known))
+    return Decision(watch=with_commitments(watch, known))
 
 
 def _taken(watch: Watch, _: events.StopsTaken) -> Decision:
-    return Decision(watch=replace(watch, stops=()))
+    return Decision(watch=changed(watch, stops=()))
 
 
 _DECIDED: dict[type[Event], Callable[[Watch, Any], Decision]] = {

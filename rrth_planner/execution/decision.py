@@ -3,13 +3,14 @@
 """What follows from an event: the next watch, and what is to be published and said."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 import math
 from typing import Optional
 
 from rrth_planner.execution.event import Event
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.watch import Level, MonitorRules, Watch
+from rrth_planner.model.frozen import changed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,15 +86,29 @@ class Decision:
     is_free: bool = False
     is_stop: bool = False
 
+    @property
+    def is_silent(self) -> bool:
+        """Whether nothing follows but what is known then."""
+        return (
+            self.command is None
+            and self.otherwise is None
+            and self.next is None
+            and not self.lines
+            and self.age is None
+            and not (self.is_look_due or self.is_free or self.is_stop)
+        )
+
 
 def followed_by(first: Decision, step: Callable[[Watch], Decision]) -> Decision:
     """Return a decision with what follows from its watch; one of both may have a command."""
     after = step(first.watch)
+    if first.is_silent:
+        return after
     assert first.command is None or after.command is None
-    otherwise = after.otherwise and replace(
+    otherwise = after.otherwise and changed(
         after.otherwise, lines=first.lines + after.otherwise.lines, age=first.age
     )
-    return replace(
+    return changed(
         after,
         command=first.command or after.command,
         otherwise=first.otherwise or otherwise,

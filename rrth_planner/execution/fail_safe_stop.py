@@ -4,7 +4,6 @@
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
 import traceback
 
 from rrth_planner.collision.certificate import least_clearance
@@ -30,7 +29,9 @@ from rrth_planner.execution.watch import (
     PendingStop,
     recorded,
     Watch,
+    with_tracked,
 )
+from rrth_planner.model.frozen import changed
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import part_of
 
@@ -71,18 +72,18 @@ def stopped(
         (False, ()) if running is None else _is_withheld(watch, stop, running, at.now)
     )
     if is_withheld and running is not None:
-        watch, command = replace(watch, withheld=running), None
+        watch, command = changed(watch, withheld=running), None
         since = max(0.0, at.now - running.start_time)
         if since < running.trajectory.duration:
             left = part_of(running.trajectory, since, running.trajectory.duration)
-            stop = replace(running, trajectory=left, start_time=at.now)
+            stop = changed(running, trajectory=left, start_time=at.now)
     else:
         command = command_of(watch, stop)
         if watch.is_unstamped:
-            command = replace(command, begin=0.0)
-        watch = replace(watch, tracked=track_stop(watch.tracked, stop), is_unstamped=False)
+            command = changed(command, begin=0.0)
+        watch = changed(watch, tracked=track_stop(watch.tracked, stop), is_unstamped=False)
     n_stops = watch.n_stops + 1
-    watch = replace(
+    watch = changed(
         watch, state=MonitorState.STOPPING, stop_reason=why, pending=None, n_stops=n_stops
     )
     return Decision(watch=watch, command=command, lines=lines, is_stop=True), stop
@@ -93,7 +94,7 @@ def stopped_for_body(
 ) -> Decision:
     """Command a stop before the wearer; is_safe: whether it is proven free of him."""
     found, stop = stopped(watch, at, stop, why)
-    watch = replace(found.watch, stop_level=Level.WARN)
+    watch = changed(found.watch, stop_level=Level.WARN)
     sentence = _sentence(watch, at, stop)
     watch = entered(watch, MonitorState.STOPPING, sentence, Level.WARN)
     proven_free_of = scene if is_safe else None
@@ -101,9 +102,9 @@ def stopped_for_body(
     watch = failed(watch, why, is_fault=False)
     if not is_safe:
         # How near it comes takes long to find.
-        return replace(found, watch=watch, next=StopUnproven(at, stop, scene))
+        return changed(found, watch=watch, next=StopUnproven(at, stop, scene))
     line = Line(Level.WARN, sentence, is_timed=True)
-    return replace(found, watch=watch, lines=(*found.lines, line))
+    return changed(found, watch=watch, lines=(*found.lines, line))
 
 
 def said_unproven(watch: Watch, event: StopUnproven) -> Decision:
@@ -123,7 +124,7 @@ def pending(watch: Watch, event: Fail) -> Watch:
     why, is_replanned = event.why, event.is_replanned
     if watch.running is None:
         return watch
-    watch = replace(watch, n_faults=watch.n_faults + event.is_fault)
+    watch = changed(watch, n_faults=watch.n_faults + event.is_fault)
     if watch.is_monitoring:
         # What is not to be planned again does not become so by what fails later.
         is_replanned = is_replanned and (watch.pending is None or watch.pending.is_replanned)
@@ -131,13 +132,13 @@ def pending(watch: Watch, event: Fail) -> Watch:
         level = Level.WARN if event.is_replanned else Level.OK
         level = Level.ERROR if event.is_fault else level
         stop = PendingStop(why, event.at.steady, is_replanned)
-        watch = replace(watch, pending=stop, stop_level=level)
+        watch = changed(watch, pending=stop, stop_level=level)
         # An error in what is said must not keep the arm from being stopped.
         with suppress(Exception):
             watch = failed(watch, why, event.is_fault)
     elif event.is_fault:
         # The arm stops already; what is planned for after that does not begin.
-        watch = replace(watch, stop_reason=why, n_stops=watch.n_stops + 1)
+        watch = changed(watch, stop_reason=why, n_stops=watch.n_stops + 1)
         watch = entered(watch, watch.state, why, Level.ERROR)
         if watch.running is not None and (not watch.stops or watch.stops[-1].is_replanned):
             rest = watch.running.trajectory
@@ -153,13 +154,13 @@ def stop_pending(watch: Watch, at: Moment) -> Decision:
         found = _pending_stopped(watch, at)
     except Exception:
         return Decision(watch=watch, lines=(Line(Level.ERROR, traceback.format_exc()),))
-    return replace(found, otherwise=Decision(watch=watch))
+    return changed(found, otherwise=Decision(watch=watch))
 
 
 def _pending_stopped(watch: Watch, at: Moment) -> Decision:
     running, stop = watch.running, watch.pending
     if running is None or stop is None:
-        return Decision(watch=replace(watch, pending=None))
+        return Decision(watch=changed(watch, pending=None))
     phase = phase_or_elapsed(watch, at, running)
     if phase is None:
         if not watch.commitments.is_active:
@@ -167,12 +168,12 @@ def _pending_stopped(watch: Watch, at: Moment) -> Decision:
         phase = at.now - running.start_time
     if phase >= running.trajectory.duration:
         # The motion has ended.
-        return Decision(watch=replace(watch, pending=None))
+        return Decision(watch=changed(watch, pending=None))
     found, motion = stopped(watch, at, stop_of(watch, at, running, phase), stop.why)
     sentence = _sentence(found.watch, at, motion)
     watch = entered(found.watch, MonitorState.STOPPING, sentence, watch.stop_level)
     watch = recorded(watch, motion.trajectory, None, at.rules, stop.is_replanned)
-    return replace(found, watch=watch, lines=(*found.lines, Line(Level.WARN, sentence)))
+    return changed(found, watch=watch, lines=(*found.lines, Line(Level.WARN, sentence)))
 
 
 def phase_or_elapsed(watch: Watch, at: Moment, running: ExecutingMotion) -> float | None:
@@ -187,7 +188,7 @@ def repeated_stop(watch: Watch, at: Moment) -> Decision:
     """Command the stop again where the arm does not execute it."""
     before = watch.tracked.stopped
     tracked, phase = missed_stop(watch.tracked, at.reading, at.now)
-    watch = replace(watch, tracked=tracked)
+    watch = with_tracked(watch, tracked)
     if before is None or phase is None:
         return Decision(watch=watch)
     stop = stop_of(watch, at, before, phase)
@@ -195,7 +196,7 @@ def repeated_stop(watch: Watch, at: Moment) -> Decision:
     if is_withheld:
         return Decision(watch=watch, lines=lines)
     line = Line(Level.ERROR, STOPPED_AGAIN)
-    watch = replace(watch, tracked=track_stop_again(watch.tracked, stop))
+    watch = changed(watch, tracked=track_stop_again(watch.tracked, stop))
     return Decision(
         watch=doubted(watch, Level.ERROR, NOT_STOPPED),
         command=command_of(watch, stop),
@@ -209,7 +210,7 @@ def check_withheld(watch: Watch, at: Moment) -> Decision:
     if motion is None or watch.state is not MonitorState.STOPPING:
         return Decision(watch=watch)
     if at.now >= motion.start_time + motion.trajectory.duration:
-        return Decision(watch=replace(watch, withheld=None))
+        return Decision(watch=changed(watch, withheld=None))
     stop = stop_of(watch, at, motion, 0.0)
     is_proven = False
     lines: tuple[Line, ...] = ()
@@ -222,7 +223,7 @@ def check_withheld(watch: Watch, at: Moment) -> Decision:
         if is_kept:
             return Decision(watch=watch, lines=lines)
     command = command_of(watch, stop)
-    watch = replace(watch, tracked=track_stop(watch.tracked, stop), withheld=None)
+    watch = changed(watch, tracked=track_stop(watch.tracked, stop), withheld=None)
     return Decision(watch=watch, command=command, lines=lines)
 
 
@@ -233,7 +234,7 @@ def failed(watch: Watch, why: str, is_fault: bool) -> Watch:
         return watch
     known = given.fail(watch.commitments, why) if is_fault else watch.commitments
     state = SeparationState.FAULT if is_fault else SeparationState.PROTECTIVE_STOP
-    return replace(watch, commitments=known, separation=SeparationStatus(state, why, 0.0))
+    return changed(watch, commitments=known, separation=SeparationStatus(state, why, 0.0))
 
 
 def _is_withheld(

@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which commanded motion the arm executes, the last or the one before, and how far."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 import functools
 
 import numpy as np
 from rrth_planner.execution.executing_motion import ExecutingMotion, LONGEST_LAG, phase_of
 from rrth_planner.execution.joint_reading import JointReading
+from rrth_planner.model.frozen import changed
 from rrth_planner.model.trajectory import REST_SPEED, sample, Trajectory
 
 # An arm at rest so long after the end of its motion has arrived; one that is off its motion for so
@@ -115,12 +116,12 @@ def track(
 
 def track_next(tracked: TrackedMotion, motion: ExecutingMotion) -> TrackedMotion:
     """Track a motion that continues the present one."""
-    return replace(_commanded(tracked, motion), previous=None, stopped=None)
+    return changed(_commanded(tracked, motion), previous=None, stopped=None)
 
 
 def track_stop(tracked: TrackedMotion, stop: ExecutingMotion) -> TrackedMotion:
     """Track a stop along the path of the present motion."""
-    return replace(_commanded(tracked, stop), stopped=tracked.motion)
+    return changed(_commanded(tracked, stop), stopped=tracked.motion)
 
 
 def track_stop_again(tracked: TrackedMotion, stop: ExecutingMotion) -> TrackedMotion:
@@ -130,12 +131,12 @@ def track_stop_again(tracked: TrackedMotion, stop: ExecutingMotion) -> TrackedMo
 
 def track_nothing(tracked: TrackedMotion) -> TrackedMotion:
     """Track nothing any more; the controller holds the end of what it was given last."""
-    return replace(tracked, motion=None, stopped=None, previous=None)
+    return changed(tracked, motion=None, stopped=None, previous=None)
 
 
 def forget_command(tracked: TrackedMotion) -> TrackedMotion:
     """Take it that the controller holds the arm where that is."""
-    return replace(tracked, command=None, off_since=None)
+    return changed(tracked, command=None, off_since=None)
 
 
 def check_command(
@@ -153,9 +154,9 @@ def check_command(
     taken = max(reading.taken, now - lag)
     is_off = tracked.command.deviation(reading.positions, taken, lag) > OFF_COMMAND
     if not is_off or reading.is_moving(now, tracked.rest_speed):
-        return tracked if tracked.off_since is None else replace(tracked, off_since=None)
+        return tracked if tracked.off_since is None else changed(tracked, off_since=None)
     if tracked.off_since is None:
-        return replace(tracked, off_since=steady)
+        return changed(tracked, off_since=steady)
     return forget_command(tracked) if steady - tracked.off_since > OFF_AFTER else tracked
 
 
@@ -176,7 +177,7 @@ def shifted(tracked: TrackedMotion, step: float) -> TrackedMotion:
     """Return it by a clock that was set forward by a step [s]."""
     motion = tracked.motion and tracked.motion.shifted(step)
     is_running = tracked.command is tracked.motion
-    return replace(
+    return changed(
         tracked,
         motion=motion,
         command=motion if is_running else tracked.command and tracked.command.shifted(step),
@@ -215,7 +216,7 @@ def tracked_phase(
 
 def find(tracked: TrackedMotion, now: float) -> TrackedMotion:
     """Take note that the arm was found on its motion."""
-    return replace(tracked, found=now)
+    return changed(tracked, found=now)
 
 
 def is_lost(tracked: TrackedMotion, now: float) -> bool:
@@ -235,7 +236,7 @@ def track_previous(tracked: TrackedMotion, reading: JointReading | None) -> Trac
     q, v = reading.positions, reading.velocities
     if tracked.stopped is not None and phase_of(q, v, before.trajectory) is None:
         return tracked
-    return replace(
+    return changed(
         _commanded(tracked, before),
         previous=motion,
         stopped=None,
@@ -258,9 +259,9 @@ def missed_stop(
         return tracked, None
     phase = before.phase(reading.positions, reading.taken, now)
     if phase is None or phase >= before.trajectory.duration:
-        return replace(tracked, stopped=None), None
+        return changed(tracked, stopped=None), None
     return tracked, phase
 
 
 def _commanded(tracked: TrackedMotion, motion: ExecutingMotion) -> TrackedMotion:
-    return replace(tracked, motion=motion, command=motion, off_since=None)
+    return changed(tracked, motion=motion, command=motion, off_since=None)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """All that is known of what the arm was given, and of what became of that: one frozen value."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum, IntEnum
 import math
 from typing import Protocol
@@ -12,6 +12,7 @@ from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.separation_status import SeparationStatus
 from rrth_planner.execution.tracked_motion import TrackedMotion
 from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.frozen import changed
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.separation import Separation
@@ -274,16 +275,26 @@ class Watch:
         )
 
 
+def with_commitments(watch: Watch, commitments: Commitments) -> Watch:
+    """Return it with other commitments, or itself where they are the same."""
+    return watch if commitments is watch.commitments else changed(watch, commitments=commitments)
+
+
+def with_tracked(watch: Watch, tracked: TrackedMotion) -> Watch:
+    """Return it with another tracked motion, or itself where that is the same."""
+    return watch if tracked is watch.tracked else changed(watch, tracked=tracked)
+
+
 def entered(watch: Watch, state: MonitorState, sentence: str, level: Level = Level.WARN) -> Watch:
     """Return it in a state, with a sentence about that."""
     level = level if sentence else Level.OK
-    return replace(watch, state=state, sentence=sentence, level=level)
+    return changed(watch, state=state, sentence=sentence, level=level)
 
 
 def doubted(watch: Watch, level: Level, why: str) -> Watch:
     """Say, until the arm follows a motion, that it may not be given what it needs."""
     sentence = f'{why}: expected a controller that executes {watch.motion_topic}'
-    return replace(watch, is_doubted=True, unfollowed=(level, sentence))
+    return changed(watch, is_doubted=True, unfollowed=(level, sentence))
 
 
 def ignored(watch: Watch, why: str, has_moved: bool = False) -> Watch:
@@ -292,12 +303,12 @@ def ignored(watch: Watch, why: str, has_moved: bool = False) -> Watch:
     n = 0 if has_moved else watch.n_ignored + 1
     level = Level.ERROR if n >= MOST_IGNORED else Level.WARN
     sentence = f'{why} ({n} motions one after the other)' if n > 1 else why
-    return doubted(replace(watch, n_ignored=n, is_ignored=True), level, sentence)
+    return doubted(changed(watch, n_ignored=n, is_ignored=True), level, sentence)
 
 
 def followed(watch: Watch) -> Watch:
     """Withdraw what was said of an arm that follows its motion."""
-    return replace(
+    return changed(
         watch, n_ignored=0, is_ignored=False, is_doubted=False, unfollowed=(Level.OK, '')
     )
 
@@ -313,9 +324,9 @@ def recorded(
     is_replanned = is_replanned and rules.replan
     found = Stop(stop, watch.goal, watch.rules, scene, is_replanned, watch.n_motions)
     is_manual = watch.commitments.is_active and watch.rules.execution.is_manual
-    waiting = replace(found, scene=None) if is_manual and is_replanned else None
+    waiting = changed(found, scene=None) if is_manual and is_replanned else None
     if is_manual:
         # It goes on after a reset, or a request.
-        found = replace(found, is_replanned=False)
+        found = changed(found, is_replanned=False)
     stops = (*watch.stops, found)[-MOST_STOPS:]
-    return replace(watch, stops=stops, waiting=waiting, is_held=not found.is_replanned)
+    return changed(watch, stops=stops, waiting=waiting, is_held=not found.is_replanned)

@@ -3,9 +3,12 @@
 """Values with arrays that cannot be changed, and whose copies are like them."""
 
 from dataclasses import fields
-from typing import Any, ClassVar
+import functools
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
+
+T = TypeVar('T')
 
 
 class Frozen:
@@ -41,3 +44,27 @@ def read_only(array: Any) -> Any:
 
 def _made(kind: type[Frozen], arguments: dict[str, Any]) -> Frozen:
     return kind(**arguments)
+
+
+@functools.cache
+def _slots(kind: Any) -> tuple[tuple[str, Any, Any], ...]:
+    """Return name, reader and writer of each field of a frozen dataclass with slots."""
+    members = ((f.name, getattr(kind, f.name)) for f in fields(kind))
+    return tuple((name, slot.__get__, slot.__set__) for name, slot in members)
+
+
+def changed(value: T, **others: Any) -> T:
+    """
+    Return a frozen dataclass, with slots, that differs in some fields.
+
+    In half the time of `dataclasses.replace`, since nothing is checked again: for values that
+    check nothing when they are made, and are made anew with every body.
+    """
+    kind: Any = type(value)
+    made = object.__new__(type(value))
+    slots = _slots(kind)
+    for name, read, write in slots:
+        write(made, others.pop(name) if name in others else read(value))
+    if others:
+        raise TypeError(f'{type(value).__name__} has no field {", ".join(others)}')
+    return made
