@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """A client of a planner node that runs as a process of its own."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 import os
 import signal
 import time
 from typing import Any, TypeVar
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PointStamped
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
@@ -19,7 +20,9 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.rotation import quaternion_xyzw
 from rrth_planner.model.scene import Scene
+from rrth_planner.ros.messages.answer import Answer, answer_from_msg, answer_from_text
 from rrth_planner.ros.middleware.child_process import ChildProcess
+from rrth_planner.ros.middleware.qos import ANSWERED
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
@@ -40,6 +43,9 @@ class Client(Node):
         self._target = self.create_publisher(PointStamped, 'target', LATCHED)
         self._joints = self.create_publisher(JointState, 'joint_states', LATCHED)
         self._plan = self.create_client(Trigger, 'rrth_planner/plan')
+        self._answers: dict[int, Answer] = {}
+        topic = 'rrth_planner/answer'
+        self.create_subscription(DiagnosticStatus, topic, self._on_answer, ANSWERED)
         # The last message of each topic.
         self.published: dict[str, Any] = {}
         self._spinner = SingleThreadedExecutor()
@@ -94,6 +100,19 @@ class Client(Node):
         if not future.done():
             raise RrthError(f'planner node: no answer within {ANSWER:g} s')
         return elapsed, future.result()
+
+    def figures_of(self, response: Trigger.Response) -> Mapping[str, float]:
+        """Return the figures of an answer, which come beside it."""
+        number, end = answer_from_text(response.message).number, time.perf_counter() + ANSWER
+        while number not in self._answers:
+            self._spinner.spin_once(ANSWER)
+            if time.perf_counter() > end:
+                raise RrthError(f'planner node: no figures of answer {number}')
+        return self._answers.pop(number).figures
+
+    def _on_answer(self, msg: DiagnosticStatus) -> None:
+        answer = answer_from_msg(msg)
+        self._answers = {answer.number: answer}
 
     def _publish_acked(self, publisher: Any, message: Any) -> None:
         end = time.monotonic() + ANSWER

@@ -29,10 +29,12 @@ from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.separation import Separation, SeparationRules
 from rrth_planner.model.trajectory import Trajectory
+from rrth_planner.pipeline.host import BlockingHost, completed
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.ros.interface.inputs import Inputs
+from rrth_planner.ros.interface.outcome import Outcome
 from rrth_planner.ros.interface.parameters import (
     declared,
     parameters_from_values,
@@ -46,7 +48,7 @@ from rrth_planner.ros.messages.fields import NANOSECONDS
 from rrth_planner.ros.messages.marker_edits import BodyPart
 from rrth_planner.ros.messages.trajectory import joint_trajectory_to_msg
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor
-from rrth_planner.ros.requests.plan_request import plan_request, PlanOutcome
+from rrth_planner.ros.requests.plan_request import plan_request
 from rrth_planner.ros.requests.revalidation import Revalidation
 from rrth_planner.simulation.lagging_arm import LaggingArm
 from rrth_planner.simulation.trajectory_controller import (
@@ -71,8 +73,6 @@ LATE_BODY, LOST_BODIES = 0.02, 0.03
 # second one. Shorter ones would have to be waited for in real time [s].
 PLANNING, LONG, SECOND = (0.024, 0.045), (0.055, 0.07), (0.12, 0.15)
 OFTEN_LONG = 0.1
-# While a request waits for its handover the clock is read so far apart [s].
-POLL = 2e-3
 # After how long a motion is replaced [s].
 LATER = (0.05, 0.7)
 # A session that sees nothing new for so long is over [s].
@@ -375,28 +375,23 @@ class _Session:
         """Have a motion to a random target planned and published."""
         self._planner.n_tries = 0
         seed = int(self._rng.integers(2**31))
-
-        def is_stopped() -> bool:
-            # It is polled where a request waits for its handover.
-            self._pass(POLL)
-            return False
-
-        plan_request(
-            self._inputs,
-            replace(self._parameters, seed=seed),
-            self._clock,
-            self._planner,
-            is_stopped,
-            self._publish,
-            PointingGoal(random_target(self._rng)),
-            self._monitor.hold,
+        completed(
+            plan_request(
+                BlockingHost(self._planner, self._clock, self._pass, self._clock),
+                self._inputs,
+                replace(self._parameters, seed=seed),
+                lambda: False,
+                self._publish,
+                PointingGoal(random_target(self._rng)),
+                self._monitor.hold,
+            )
         )
 
-    def _publish(self, outcome: PlanOutcome, revalidation: Revalidation) -> bool:
+    async def _publish(self, outcome: Outcome, revalidation: Revalidation) -> Outcome | None:
         """Publish a motion as `PlanQueue` does."""
         revalidation.require_fit()
         if revalidation.is_late():
-            return False
+            return None
         trajectory, plan, snapshot = outcome.trajectory, outcome.plan, outcome.snapshot
         assert trajectory is not None and plan is not None and snapshot is not None
         handover, parameters = outcome.handover, revalidation.parameters
@@ -414,7 +409,7 @@ class _Session:
             joins=math.inf if handover is None else handover.joins,
             planned_from=None if handover is None else handover.before,
         )
-        return True
+        return outcome
 
 
 def _nobody() -> Scene:

@@ -75,11 +75,9 @@ def _plans(n: int) -> list[Row]:
             child.check()
             if answer.success:
                 n_solved += 1
-                inside = re.search(r'planning time ([0-9.]+) ms', answer.message)
+                inside = client.figures_of(answer)['planning_time_ms']
                 rows.append(figure_row('round trip', 1e3 * elapsed, 'ms', seed=k))
-                rows.append(
-                    figure_row('planning in the node', float(inside.group(1)), 'ms', seed=k)
-                )
+                rows.append(figure_row('planning in the node', inside, 'ms', seed=k))
             else:
                 rows.append(
                     figure_row('rejection', 1e3 * elapsed, 'ms', seed=k, detail=answer.message)

@@ -22,13 +22,13 @@ from rrth_planner.io.extras import require
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.errors import MessageError, OptionsError, RrthError
 from rrth_planner.model.status import ErrorCode
-from rrth_planner.ros.client.answer_parser import Answer, answer_from_text
 from rrth_planner.ros.client.planner_client import (
     NotInTimeError,
     parameters_of_planner,
     PlannerClient,
 )
 from rrth_planner.ros.interface.parameters import PlannerParameters
+from rrth_planner.ros.messages.answer import Answer
 from rrth_planner.ros.messages.body_writer import body_from_file
 from rrth_planner.ros.messages.frames import Frames
 from rrth_planner.ros.messages.goal import goal_from_msg
@@ -54,7 +54,9 @@ class Report:
     def take(self, answer: Answer) -> None:
         """Store the response of the planner."""
         self.code, self.name = int(answer.code), answer.code.name
-        self.sentence, self.figures = answer.sentence, answer.figures
+        self.sentence, self.figures = answer.sentence, dict(answer.figures)
+        if answer.number:
+            self.figures['request'] = answer.number
         if answer.code is not ErrorCode.SUCCESS:
             self.exit_code = REJECTED
 
@@ -129,18 +131,18 @@ def _move(
 ) -> None:
     """Move the arm to a target, and wait until it has arrived."""
     # Imported here: needs tqdm, which `require` has checked.
-    from rrth_planner.ros.client.follow_motion import announced_motion, follow
+    from rrth_planner.ros.client.follow_motion import follow
 
     arm, frames = parameters.arm, Frames(client, parameters.base_frame)
     if body is not None:
         # With separation an old body is none.
         (client.publish if parameters.separation is None else client.stand)(body)
     client.publish(target)
-    answer = answer_from_text(client.ask(PATIENCE).message)
+    answer = client.ask(PATIENCE)
     report.take(answer)
     if report.exit_code != DONE:
         return
-    motion = announced_motion(client, arm, report.figures['duration'])
+    motion = client.motion_of(answer)
     point = None
     with suppress(MessageError):
         # The planner may know a frame that is unknown here.

@@ -10,6 +10,7 @@ from geometry_msgs.msg import PointStamped, Pose
 from nav_msgs.srv import GetPlan
 import rclpy
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import ParameterException
 from rclpy.logging import get_logger
 from rclpy.node import Node
@@ -27,7 +28,9 @@ from std_srvs.srv import Trigger
 # What has to be compiled, or takes long to load, is imported once the node exists: discovery goes
 # on meanwhile.
 if TYPE_CHECKING:
+    from rrth_planner.model.goal import PointingGoal
     from rrth_planner.pipeline.planning_process import Planner
+    from rrth_planner.ros.interface.outcome import Outcome
     from rrth_planner.ros.requests.point_head import PointHeadServer
 
 NAME = 'rrth_planner'
@@ -108,7 +111,8 @@ class PlannerNode(Node):
         from rrth_planner.ros.interface.reporter import Reporter
         from rrth_planner.ros.interface.scene_monitor import SceneMonitor
         from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor
-        from rrth_planner.ros.requests.request_queue import PlanQueue
+        from rrth_planner.ros.requests.node_host import NodeHost
+        from rrth_planner.ros.requests.request_queue import PERIOD, PlanQueue
 
         self._inputs = inputs = Inputs(
             *(self.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))
@@ -126,14 +130,11 @@ class PlannerNode(Node):
             self._keep_removed,
             self._monitor.check_clock,
         )
-        self._queue = PlanQueue(
-            self,
-            inputs,
-            self._reporter,
-            publishers,
-            self._monitor,
-            self._planner,
-        )
+        self.host = NodeHost(self, self._planner)
+        self._queue = PlanQueue(self.host, inputs, self._reporter, publishers, self._monitor)
+        # Not the node's clock: simulated time may stand still.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(PERIOD, self._queue.follow_up, clock=steady)
 
     def _serve_action(self, answers: Answers) -> None:
         """Offer the action point_head, where its type is installed."""
@@ -149,6 +150,7 @@ class PlannerNode(Node):
                 self._reporter,
                 self._monitor,
                 self._queue,
+                self.respond,
                 answers,
             )
 
@@ -187,13 +189,16 @@ class PlannerNode(Node):
             or now.second_checker != before.second_checker
         ):
             # Not within the time of the next plan; requests wait until it is done.
-            self._queue.prepare(
-                lambda: self._planner.warm_up(now.arm, now.options, now.second_checker)
-            )
+            self.host.begin(self.host.warm_up(now.arm, now.options, now.second_checker))
+
+    async def respond(self, goal: 'PointingGoal | None') -> 'Outcome':
+        """Return the outcome of a request for a goal, or for the last target."""
+        outcome: Outcome = await self.host.future_of(self._queue.respond(goal))
+        return outcome
 
     async def _on_plan(self, _: Any, response: Trigger.Response) -> Trigger.Response:
-        found = await self._queue.respond(None)
-        response.success, response.message = found.is_solved, found.text
+        outcome = await self.respond(None)
+        response.success, response.message = outcome.trajectory is not None, outcome.text
         return response
 
     async def _on_get_plan(
@@ -217,8 +222,9 @@ class PlannerNode(Node):
             code = code_of_rejection(problem, ErrorCode.INVALID_GOAL_CONSTRAINTS)
             self._reporter.reject(code, f'request of get_plan: {problem}')
             return response
-        found = await self._queue.respond(goal)
-        response.plan = found.tool_path()
+        outcome = await self.respond(goal)
+        if outcome.trajectory is not None and outcome.parameters is not None:
+            response.plan = self._motions.tool_path(outcome.trajectory, outcome.parameters)
         return response
 
     def _on_cancel(self, _: Any, response: Trigger.Response) -> Trigger.Response:

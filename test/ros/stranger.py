@@ -15,8 +15,8 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
+from rrth_planner.ros.interface.outcome import Outcome  # noqa: E402
 from rrth_planner.ros.planner import PlannerNode  # noqa: E402
-from rrth_planner.ros.requests.plan_request import PlanOutcome  # noqa: E402
 from samples import joints, target, wearer  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
@@ -124,5 +124,5 @@ def say_all(planner, stranger, but=(), **messages):
 @pytest.fixture(name='one_try')
 def _one_try(monkeypatch):
     """Have a request planned once, however wearer and arm move."""
-    monkeypatch.setattr(PlanOutcome, 'is_outdated', False)
-    monkeypatch.setattr(PlanOutcome, 'is_in_the_way', False)
+    monkeypatch.setattr(Outcome, 'is_outdated', False)
+    monkeypatch.setattr(Outcome, 'is_in_the_way', False)

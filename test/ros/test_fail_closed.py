@@ -30,6 +30,7 @@ from rrth_planner.ros.middleware.qos import LEASE  # noqa: E402
 from rrth_planner.ros.monitor import execution_monitor  # noqa: E402
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor  # noqa: E402
 from rrth_planner.ros.planner import PlannerNode  # noqa: E402
+from rrth_planner.ros.requests.node_host import NodeHost  # noqa: E402
 from rrth_planner.ros.requests.request_queue import PlanQueue  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
@@ -316,19 +317,20 @@ def test_after_an_error_while_the_arm_stops_nothing_is_planned_by_itself(monitor
 
 
 def test_what_is_tried_after_a_stop_is_withdrawn_after_an_error(monitored):
-    arm, never = monitored(), SimpleNamespace()
+    arm = monitored()
     arm.reporter.parameters = replace(arm.reporter.parameters, replan=True)
     node = Node('fail_closed_queue')
     publishers = SimpleNamespace(is_view_subscribed=lambda: False)
-    queue = PlanQueue(node, arm.inputs, arm.reporter, publishers, arm.monitor, never)
-    queue.prepare = lambda work: None
+    host = NodeHost(node, SimpleNamespace(close=lambda: None))
+    queue = PlanQueue(host, arm.inputs, arm.reporter, publishers, arm.monitor)
     goal = arm.monitor.goal
     arm.monitor.fail('a body is late')
-    queue._follow_up()
+    queue.follow_up()
     assert queue.pursues(goal)
     arm.monitor.fail('the monitor failed', is_replanned=False)
-    queue._follow_up()
+    queue.follow_up()
     assert not queue.pursues(goal)
+    host.close()
     node.destroy_node()
 
 

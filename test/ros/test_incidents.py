@@ -6,7 +6,6 @@ import os
 from pathlib import Path
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
@@ -31,6 +30,7 @@ from rrth_planner.model.status import (
 from rrth_planner.planning.options import RRTStarOptions  # noqa: E402
 from rrth_planner.ros.interface import reporter  # noqa: E402
 from rrth_planner.ros.interface.inputs import Inputs  # noqa: E402
+from rrth_planner.ros.interface.outcome import Outcome  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of, WearerBody  # noqa: E402
 from rrth_planner.ros.messages.error_codes import CODE_OF_STATUS  # noqa: E402
 from rrth_planner.ros.requests import incidents, plan_request  # noqa: E402
@@ -41,6 +41,7 @@ from stranger import _start, inputs_of, say_all  # noqa: E402, F401
 pytestmark = pytest.mark.usefixtures('ros_context')
 ROOT = Path(__file__).parent.parent.parent
 VIOLATION = Violation(0.25, 0.0123, 'pointing ray', 'head')
+UNEXPECTED = 'FAILURE (99999): planning failed unexpectedly: '
 SENTENCE = (
     'FAILURE (99999): the two collision checks disagree: pointing ray is 0.0123 m from box "head" '
     'at 0.250 s, expected at least 0.02 m'
@@ -99,7 +100,7 @@ def test_a_disagreement_is_answered_and_kept_to_be_replayed(
         patch.setattr(trajectory_validation, 'first_violation', lambda *_: VIOLATION)
         message = stranger.answer().message
     (file,) = tmp_path.iterdir()
-    assert message == f'{SENTENCE}, seed 5; to replay it: ./run exec replay {file}'
+    assert message == f'{SENTENCE}, seed 5; to replay it: ./run exec replay {file}; answer 1'
     stranger.wait_until(lambda: stranger.value('last incident') == str(file))
     assert stranger.value('incidents') == '1'
     assert stranger.value('last code') == 'FAILURE (99999)'
@@ -146,20 +147,27 @@ def test_a_stop_that_violates_for_the_second_checker_is_kept_to_be_replayed(
     stop = fast_stop(monitor.running.trajectory, 0.3, parameters.limits)
     scene, goal = scene_of(inputs_of(planner).body.value), inputs_of(planner).target.value
 
-    def follow_up():
-        found = Stop(stop, goal, parameters, scene, False, monitor.n_motions)
-        know(monitor, stops=(found,))
-        stranger.wait_until(lambda: not monitor.watch.stops)
-        # Whatever the node's thread is at.
-        time.sleep(0.05)
-        planner._queue._worker.submit(lambda: None).result(30.0)
+    def check(violation):
+        """Have a stop checked by a checker that finds this."""
+        asked, violation_seen = [], planner._planner.violation_seen
 
-    follow_up()
-    with monkeypatch.context() as patch:
-        # What agrees leaves nothing behind.
-        assert not list(tmp_path.iterdir())
-        patch.setattr(trajectory_validation, 'first_violation', lambda *_: VIOLATION)
-        follow_up()
+        def ask(*arguments):
+            found = violation_seen(*arguments)
+            asked.append(found)
+            return found
+
+        with monkeypatch.context() as patch:
+            patch.setattr(trajectory_validation, 'first_violation', lambda *_: violation)
+            patch.setattr(planner._planner, 'violation_seen', ask)
+            found = Stop(stop, goal, parameters, scene, False, monitor.n_motions)
+            # In the thread that also decides.
+            planner.executor.create_task(know, monitor, stops=(found,))
+            stranger.wait_until(lambda: asked)
+
+    # What agrees leaves nothing behind.
+    check(None)
+    check(VIOLATION)
+    stranger.wait_until(lambda: list(tmp_path.iterdir()))
     (file,) = tmp_path.iterdir()
     stranger.wait_until(lambda: stranger.value('last incident') == str(file))
     assert stranger.value('incidents') == '1'
@@ -194,7 +202,7 @@ def test_files_are_kept_among_the_logs_by_default(start, monkeypatch, tmp_path):
         patch.setattr(trajectory_validation, 'first_violation', lambda *_: VIOLATION)
         message = stranger.answer().message
     (file,) = (tmp_path / 'rrth_planner').iterdir()
-    assert message.endswith(str(file))
+    assert message.endswith(f'{file}; answer 1')
 
 
 def test_an_error_that_cannot_be_recorded_is_answered(start, monkeypatch):
@@ -208,7 +216,7 @@ def test_an_error_that_cannot_be_recorded_is_answered(start, monkeypatch):
         patch.setattr(planner._queue._publishers, 'publish_motion', fail)
         patch.setattr(incidents, 'error_incident', fail)
         message = stranger.answer().message
-    assert message == 'FAILURE (99999): planning failed unexpectedly: OSError: nothing works'
+    assert message == f'{UNEXPECTED}OSError: nothing works; answer 1'
     assert stranger.answer().success
 
 
@@ -225,7 +233,7 @@ def test_an_error_after_the_plan_is_kept_with_the_motion(start, monkeypatch, tmp
     (file,) = tmp_path.iterdir()
     assert message == (
         'FAILURE (99999): planning failed unexpectedly: OSError: no publisher; to replay it: '
-        f'./run exec replay {file}'
+        f'./run exec replay {file}; answer 1'
     )
     incident = read_incident(file)
     assert (incident.kind, incident.error) == (IncidentKind.ERROR, 'OSError')
@@ -249,7 +257,7 @@ def test_an_error_before_anything_was_asked_leaves_no_file(start, monkeypatch, t
     with monkeypatch.context() as patch:
         patch.setattr(plan_request, '_question', fail)
         message = stranger.answer().message
-    assert message == 'FAILURE (99999): planning failed unexpectedly: ValueError: of a test'
+    assert message == f'{UNEXPECTED}ValueError: of a test; answer 1'
     assert not list(tmp_path.iterdir())
     assert stranger.answer().success
 
@@ -308,9 +316,8 @@ def test_the_summary_of_diagnostics_is_what_is_worst(start):
     inputs = Inputs('body', 'target', 'joints')
 
     def summary(now=10.0, code=None, sentence=''):
-        report = reporter.PlanReport(code=code, sentence=sentence)
-        parameters = planner._reporter.parameters
-        return reporter.summary(now, inputs, parameters, report)
+        last = None if code is None else Outcome(code, sentence)
+        return reporter.summary(now, inputs, planner._reporter.parameters, last)
 
     def reject():
         raise MessageError('no point')

@@ -25,15 +25,15 @@ from rrth_planner.model.arrays import FARTHEST  # noqa: E402
 from rrth_planner.model.errors import (  # noqa: E402
     LONGEST_SENTENCE,
     MessageError,
-    one_line,
+    one_line,  # noqa: E402
     RequestError,  # noqa: E402
 )
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.scene import Scene  # noqa: E402
 from rrth_planner.model.status import ErrorCode  # noqa: E402
-from rrth_planner.ros.client.answer_parser import answer_from_text  # noqa: E402
 from rrth_planner.ros.interface.inputs import Input, InputSnapshot  # noqa: E402
 from rrth_planner.ros.messages import body as body_module  # noqa: E402
+from rrth_planner.ros.messages.answer import answer_from_text  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of, WearerBody  # noqa: E402
 from rrth_planner.ros.messages.error_codes import answer  # noqa: E402
 from rrth_planner.ros.messages.goal import goal_from_msg
@@ -239,9 +239,9 @@ def test_the_documents_say_how_much_is_taken():
 
 
 def test_an_answer_of_somebody_else_is_one_line():
-    answered = answer_from_text('SUCCESS (1): a\nb \x1b[31m, seed 7')
-    assert answered.sentence == 'a b ?[31m, seed 7'
-    assert answered.figures == {'seed': 7}
+    answered = answer_from_text('SUCCESS (1): a\nb \x1b[31m; answer 7')
+    assert answered.sentence == 'a b ?[31m; answer 7'
+    assert answered.number == 7
     assert 'expected NAME' in rejection(answer_from_text, f'SUCCESS ({"1" * 5000}): a')
 
 

@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 
-from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
 from geometry_msgs.msg import PointStamped  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
@@ -22,9 +22,11 @@ from rrth_planner.kernels.kinematics import pan_tilt_ik  # noqa: E402
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.rotation import quaternion_xyzw  # noqa: E402
 from rrth_planner.planning.pointing_goals import target_in_mount  # noqa: E402
-from rrth_planner.ros.client.answer_parser import answer_from_text  # noqa: E402
+from rrth_planner.ros.messages.answer import answer_from_msg, answer_from_text  # noqa: E402
+from rrth_planner.ros.messages.fields import nanoseconds_of  # noqa: E402
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg  # noqa: E402
 from rrth_planner.ros.middleware.child_process import ChildProcess  # noqa: E402
+from rrth_planner.ros.middleware.qos import ANSWERED  # noqa: E402
 import samples  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
@@ -50,7 +52,14 @@ class Client(Node):
         self.motions, self.figures = [], {}
         self.create_subscription(JointTrajectory, 'joint_trajectory', self.motions.append, LATCHED)
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_figures, 10)
+        self.answers = {}
+        topic = 'rrth_planner/answer'
+        self.create_subscription(DiagnosticStatus, topic, self._on_answer, ANSWERED)
         self.plan = self.create_client(Trigger, 'rrth_planner/plan')
+
+    def _on_answer(self, msg):
+        answer = answer_from_msg(msg)
+        self.answers[answer.number] = answer
 
     def _on_figures(self, msg):
         self.figures = {pair.key: pair.value for pair in msg.status[0].values}
@@ -139,8 +148,12 @@ def test_two_hundred_motions_round_twenty_bodies_have_no_contact(wait_until, sen
                     assert _is_blocked_by_reference(rng, arm, scene, target), answer.message
                     assert len(client.motions) == n_before
                     continue
-                times.append(answer_from_text(answer.message).figures['planning_time_ms'])
+                number = answer_from_text(answer.message).number
+                wait_until(lambda n=number: n in client.answers)
+                times.append(client.answers[number].figures['planning_time_ms'])
                 wait_until(lambda n=n_before: len(client.motions) == n + 1)
+                stamp = nanoseconds_of(client.motions[-1].header.stamp)
+                assert client.answers[number].stamp == stamp
                 moved = time.monotonic()
                 motion = joint_trajectory_from_msg(client.motions[-1], arm.joint_names)
                 # Raises where the motion violates at 0.5 ms sampling, or misses by 1 mm.

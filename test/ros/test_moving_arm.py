@@ -4,8 +4,6 @@
 
 from dataclasses import replace
 from itertools import count
-from threading import Thread
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,16 +15,16 @@ from monitored import without_separation  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rrth_planner.execution.command import ahead  # noqa: E402
 from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
+from rrth_planner.execution.handover import EARLY, LEADS  # noqa: E402
 from rrth_planner.execution.joint_reading import JointReading  # noqa: E402
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.status import ErrorCode  # noqa: E402
 from rrth_planner.model.trajectory import REST_SPEED, sample, Trajectory  # noqa: E402
+from rrth_planner.pipeline.host import BlockingHost, completed  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
 from rrth_planner.ros.interface.inputs import Input, Inputs, InputSnapshot  # noqa: E402
 from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
 from rrth_planner.ros.messages.marker_edits import BodyPart  # noqa: E402
-from rrth_planner.ros.requests import handover  # noqa: E402
-from rrth_planner.ros.requests.handover import EARLY, LEADS  # noqa: E402
 from rrth_planner.ros.requests.plan_request import plan_request  # noqa: E402
 from rrth_planner.ros.requests.revalidation import Revalidation  # noqa: E402
 from rrth_planner.timing.fast_stop import fast_stop  # noqa: E402
@@ -77,21 +75,23 @@ def _ask(monkeypatch):
 
     def ask(motion, since, is_known=True, tick=2e-4, reading=0.0, checking=None, pace=1.0):
         clock, disagreement = Clock(BEGIN + since, tick), Revalidation.disagreement
-        if tick > 0.0:
-            # No time but that of the clock, however busy the machine.
-            still = SimpleNamespace(monotonic=lambda: 0.0, sleep=lambda _: None)
-            monkeypatch.setattr(handover, 'time', still)
+        slept = []
 
-        def publish(_, revalidation):
+        def sleep(seconds):
+            # No time but that of the clock, however busy the machine; it may stand still.
+            slept.append(seconds)
+            clock.now += seconds * (tick > 0.0)
+
+        async def publish(outcome, revalidation):
             clock.now += reading
             if checking is not None:
                 publish_body(0.01 * next(n_bodies))
             revalidation.require_fit()
-            return not revalidation.is_late()
+            return None if revalidation.is_late() else outcome
 
-        def check_slowly(*args):
+        async def check_slowly(*args):
             clock.now += checking
-            return disagreement(*args)
+            return await disagreement(*args)
 
         def publish_body(shift):
             """Let a body come whose parts are so much further back [m]."""
@@ -106,17 +106,11 @@ def _ask(monkeypatch):
         publish_body(0.01 * next(n_bodies))
         inputs.joints = Following(motion, clock, pace)
         running = ExecutingMotion(trajectory=motion, start_time=BEGIN) if is_known else None
-        outcome = plan_request(
-            inputs,
-            parameters,
-            clock,
-            planner,
-            lambda: False,
-            publish,
-            TARGET,
-            lambda until: running,
+        host = BlockingHost(planner, clock, sleep, lambda: sum(slept))
+        request = plan_request(
+            host, inputs, parameters, lambda: False, publish, TARGET, lambda until: running
         )
-        return outcome, clock.now
+        return completed(request), clock.now
 
     yield ask
     node.destroy_node()
@@ -177,12 +171,8 @@ def test_an_arm_whose_motion_is_unknown_is_checked_as_late_as_possible(ask):
 
 
 def test_a_clock_that_stands_still_is_not_waited_for(ask):
-    outcomes = []
     # As a simulation that is paused: the time to publish the motion never comes.
-    thread = Thread(target=lambda: outcomes.append(ask(_swings(), 0.4, tick=0.0)), daemon=True)
-    thread.start()
-    thread.join(30.0)
-    ((outcome, _),) = outcomes
+    outcome, _ = ask(_swings(), 0.4, tick=0.0)
     assert outcome.code is ErrorCode.SUCCESS, outcome.sentence
     assert outcome.handover.time == pytest.approx(BEGIN + 0.4 + LEADS[0] + AHEAD)
 

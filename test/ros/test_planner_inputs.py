@@ -98,7 +98,7 @@ def test_velocities_that_are_no_numbers_are_rejected(start):
     say_all(planner, stranger, joint_states=joints(velocity=[NAN, 0.0, 0.0, 0.0]))
     assert stranger.answer().message == (
         'START_STATE_INVALID (-26): joint_1 moves at nan rad/s, expected a velocity for every '
-        'joint'
+        'joint; answer 1'
     )
     stranger.publishers['joint_states'].publish(joints(velocity=[0.009] * 4))
     stranger.wait_until(lambda: inputs_of(planner).joints.value.velocities[1] == 0.009)

@@ -15,6 +15,7 @@ import pytest
 pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 
+from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
 from nav_msgs.srv import GetPlan  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.parameter_client import AsyncParameterClient  # noqa: E402
@@ -27,9 +28,13 @@ from rrth_planner.pipeline import in_process_planner  # noqa: E402
 from rrth_planner.pipeline.planning_process import PlanningProcessError  # noqa: E402
 from rrth_planner.ros import planner as planner_module  # noqa: E402
 from rrth_planner.ros.client import planner_client  # noqa: E402
+from rrth_planner.ros.interface.outcome import Outcome  # noqa: E402
 from rrth_planner.ros.interface.parameters import RULES  # noqa: E402
-from rrth_planner.ros.interface.reporter import PlanReport  # noqa: E402
-from rrth_planner.ros.messages.fields import seconds_of  # noqa: E402
+from rrth_planner.ros.messages.answer import answer_from_msg, answer_from_text  # noqa: E402
+from rrth_planner.ros.messages.fields import (
+    nanoseconds_of,  # noqa: E402
+    seconds_of,  # noqa: E402
+)
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg  # noqa: E402
 from rrth_planner.ros.requests.revalidation import Revalidation  # noqa: E402
 from samples import array, box, command, fenced, FOLDED, JOINTS, joints, target, wearer  # noqa: E402
@@ -65,6 +70,42 @@ def test_a_plan_is_published_and_then_answered(start):
     assert len(stranger.received['rrth_planner/tool_path'][0].poses) > 1
     shown = {m.ns for m in stranger.received['rrth_planner/markers'][0].markers}
     assert shown == {'', 'body', 'arm_start', 'arm_goal', 'ray', 'tool_path'}
+
+
+def test_each_answer_is_published_with_its_figures_and_the_stamp_of_its_motion(start):
+    planner, stranger = start(seed=3)
+    stranger.subscribe('rrth_planner/answer', DiagnosticStatus, 100)
+    stranger.wait_until(lambda: planner.count_subscribers('rrth_planner/answer') > 0)
+    say_all(planner, stranger)
+    solved = answer_from_text(stranger.answer().message)
+    stranger.publishers['target'].publish(target(0.0, 0.0, 0.0))
+    stranger.wait_until(lambda: not inputs_of(planner).target.value.target.any())
+    rejected = answer_from_text(stranger.answer().message)
+    # A request whose answer has no sentence has a number, too.
+    request = GetPlan.Request()
+    request.goal.pose.position.x = 1.5
+    path = stranger.answer('get_plan', request).plan
+    received = stranger.received['rrth_planner/answer']
+    stranger.wait_until(lambda: len(received) == 3)
+    found = [answer_from_msg(msg) for msg in received]
+    name = planner.get_fully_qualified_name()[1:]
+    assert {msg.name for msg in received} == {f'{name}: answer'}
+    assert [ord(msg.level) for msg in received] == [0, 1, 0]
+    assert [answer.number for answer in found] == [1, 2, 3]
+    assert (solved.number, rejected.number) == (1, 2)
+    assert [answer.text for answer in found[:2]] == [solved.text, rejected.text]
+    stranger.wait_until(lambda: len(stranger.received['joint_trajectory']) == 2)
+    stamps = [nanoseconds_of(m.header.stamp) for m in stranger.received['joint_trajectory']]
+    assert [answer.stamp for answer in found] == [stamps[0], None, stamps[1]]
+    assert path.poses
+    motion = joint_trajectory_from_msg(stranger.received['joint_trajectory'][0], JOINTS)
+    figures = found[0].figures
+    assert figures['seed'] == 3
+    # Before it the arm rests until any controller has it.
+    assert figures['duration'] == pytest.approx(motion.duration - motion.times[1], abs=1e-6)
+    for key in ('planning_time_ms', 'response_time_ms', 'path_length', 'waypoints'):
+        assert figures[key] > 0.0
+    assert 'duration' not in found[1].figures
 
 
 def test_get_plan_takes_its_target_and_returns_the_path_of_the_tool(start):
@@ -201,7 +242,7 @@ def test_whatever_goes_wrong_is_answered(start, monkeypatch, tmp_path):
         message = stranger.answer().message
     sentence = 'FAILURE (99999): planning failed unexpectedly: ZeroDivisionError: of a test; '
     (file,) = tmp_path.iterdir()
-    assert message == f'{sentence}to replay it: ./run exec replay {file}'
+    assert message == f'{sentence}to replay it: ./run exec replay {file}; answer 1'
     assert not stranger.received['joint_trajectory']
     assert stranger.answer().success
 
@@ -230,8 +271,8 @@ def test_what_was_cancelled_is_never_published(start, monkeypatch):
     queue, disagreement = planner._queue, Revalidation.disagreement
     ended = []
 
-    def cancel_after_the_revalidation(*args):
-        found = disagreement(*args)
+    async def cancel_after_the_revalidation(*args):
+        found = await disagreement(*args)
         ended.append(queue.cancel())
         return found
 
@@ -239,7 +280,7 @@ def test_what_was_cancelled_is_never_published(start, monkeypatch):
         patch.setattr(Revalidation, 'disagreement', cancel_after_the_revalidation)
         message = stranger.answer().message
     assert ended == [1]
-    assert message == 'PREEMPTED (-7): the request was cancelled'
+    assert message == 'PREEMPTED (-7): the request was cancelled; answer 1'
     assert not stranger.received['joint_trajectory']
     assert stranger.answer().success
     stranger.wait_until(lambda: len(stranger.received['joint_trajectory']) == 1)
@@ -249,13 +290,14 @@ def test_a_cancel_does_not_count_what_was_published(start, monkeypatch):
     planner, stranger = start()
     say_all(planner, stranger)
     queue, ended = planner._queue, []
-    show = queue._show
+    publishers = planner._motions
+    publish = publishers.publish_view
 
     def cancel_first(*args):
         ended.append(queue.cancel())
-        return show(*args)
+        return publish(*args)
 
-    monkeypatch.setattr(queue, '_show', cancel_first)
+    monkeypatch.setattr(publishers, 'publish_view', cancel_first)
     assert stranger.answer().success
     stranger.wait_until(lambda: ended)
     assert ended == [0]
@@ -264,14 +306,14 @@ def test_a_cancel_does_not_count_what_was_published(start, monkeypatch):
 def test_a_request_is_answered_before_its_motion_is_shown(start, monkeypatch):
     planner, stranger = start()
     say_all(planner, stranger)
-    queue, is_answered = planner._queue, Event()
-    show = queue._show
+    publishers, is_answered = planner._motions, Event()
+    publish = publishers.publish_view
 
     def show_late(*args):
         assert is_answered.wait(30.0)
-        show(*args)
+        publish(*args)
 
-    monkeypatch.setattr(queue, '_show', show_late)
+    monkeypatch.setattr(publishers, 'publish_view', show_late)
     assert stranger.answer().success
     stranger.wait_until(lambda: stranger.received['joint_trajectory'])
     assert not stranger.received['rrth_planner/markers']
@@ -286,7 +328,7 @@ def test_an_error_in_showing_a_motion_does_not_revoke_it(start, monkeypatch):
     def fail(*args):
         raise RuntimeError('no colours')
 
-    monkeypatch.setattr(planner._queue, '_show', fail)
+    monkeypatch.setattr(planner._motions, 'publish_view', fail)
     for _ in range(2):
         assert stranger.answer().success
 
@@ -297,8 +339,8 @@ def test_nothing_is_published_once_the_node_closes(start, monkeypatch):
     queue, disagreement = planner._queue, Revalidation.disagreement
     closers = []
 
-    def close_after_the_revalidation(*args):
-        found = disagreement(*args)
+    async def close_after_the_revalidation(*args):
+        found = await disagreement(*args)
         closers.append(Thread(target=queue.close))
         closers[0].start()
         stranger.wait_until(lambda: queue._is_closed)
@@ -361,7 +403,7 @@ def test_diagnostics_bear_the_name_of_the_node_and_keep_to_10_hz(start):
         planner._reporter.publish()
         time.sleep(0.005)
     assert 5 <= len(arrays) - n_before <= 13
-    planner._reporter.conclude(ErrorCode.FAILURE, 'the last', PlanReport())
+    planner._reporter.conclude(Outcome(ErrorCode.FAILURE, 'the last'))
     stranger.wait_until(lambda: stranger.value('last sentence') == 'the last', 0.9)
 
 
@@ -388,29 +430,6 @@ def test_many_calls_at_once_are_all_answered(start):
     futures = [stranger.ask('plan') for _ in range(40)]
     stranger.wait_until(lambda: all(future.done() for future in futures))
     assert all(future.result().success for future in futures)
-
-
-def test_what_two_threads_report_is_all_counted(start):
-    planner, _ = start()
-    reporter, n, n_before = planner._reporter, 300, planner._reporter.report.n_requests
-    interval = sys.getswitchinterval()
-    sys.setswitchinterval(1e-6)
-
-    def work():
-        for _ in range(n):
-            reporter.conclude(ErrorCode.SUCCESS, 'done', PlanReport())
-            reporter.stop_published(1e-3)
-
-    try:
-        threads = [Thread(target=work) for _ in range(2)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-    finally:
-        sys.setswitchinterval(interval)
-    assert reporter.report.n_requests - n_before == reporter.report.n_solved == 2 * n
-    assert reporter._stops_published.n == 2 * n
 
 
 @pytest.fixture(name='process')

@@ -21,11 +21,9 @@ from rrth_planner.model.trajectory import positions_at  # noqa: E402
 from rrth_planner.pipeline import in_process_planner  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of  # noqa: E402
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg  # noqa: E402
-from rrth_planner.ros.middleware import executor_barrier  # noqa: E402
-from rrth_planner.ros.middleware.executor_barrier import ExecutorBarrier  # noqa: E402
-from rrth_planner.ros.requests.revalidation import Revalidation  # noqa: E402
-from samples import array, box, command, fenced, FOLDED, JOINTS, joints  # noqa: E402
-from stranger import _one_try, _start, inputs_of, say_all  # noqa: E402, F401
+from rrth_planner.ros.requests import node_host  # noqa: E402
+from samples import array, box, command, fenced, FOLDED, JOINTS, joints, wearer  # noqa: E402
+from stranger import _one_try, _start, inputs_of, say_all, TOPICS  # noqa: E402, F401
 from visualization_msgs.msg import Marker  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
@@ -136,40 +134,24 @@ def test_a_plan_for_what_is_no_longer_there_is_not_published(
 
 @pytest.mark.usefixtures('one_try')
 @pytest.mark.parametrize(
-    ('owner', 'step', 'topic', 'msg', 'answer'),
+    ('topic', 'msg', 'answer'),
     [
-        (in_process_planner, 'plan_question', 'body_boxes', fenced(), 'the wearer moved'),
-        (Revalidation, 'disagreement', 'body_boxes', fenced(), 'the wearer moved'),
-        (
-            Revalidation,
-            'disagreement',
-            'body_boxes',
-            array(command(Marker.DELETEALL)),
-            'has lost parts: "torso/0", "head/0"',
-        ),
-        (
-            Revalidation,
-            'disagreement',
-            'joint_states',
-            joints([0.5, *FOLDED[1:]]),
-            'the arm moved by 0.5000',
-        ),
-        (
-            Revalidation,
-            'disagreement',
-            'joint_states',
-            joints(velocity=[0.3] * 4),
-            'joint_1 moves at 0.300',
-        ),
+        ('body_boxes', fenced(), 'the wearer moved'),
+        ('body_boxes', array(command(Marker.DELETEALL)), 'has lost parts: "torso/0", "head/0"'),
+        ('joint_states', joints([0.5, *FOLDED[1:]]), 'the arm moved by 0.5000'),
+        ('joint_states', joints(velocity=[0.3] * 4), 'joint_1 moves at 0.300'),
     ],
 )
+@pytest.mark.parametrize('is_checked', [False, True])
 def test_what_came_but_was_not_read_yet_counts(
-    start, monkeypatch, owner, step, topic, msg, answer
+    start, monkeypatch, wait_until, is_checked, topic, msg, answer
 ):
-    monkeypatch.setattr(executor_barrier, 'LONGEST', 30.0)
     planner, stranger = start()
     say_all(planner, stranger)
-    original = getattr(owner, step)
+    owner = planner._planner if is_checked else in_process_planner
+    step = 'violation_seen' if is_checked else 'plan_question'
+    original, plan_question = getattr(owner, step), in_process_planner.plan_question
+    inputs = inputs_of(planner)
 
     def work_while_the_node_is_busy(*args, **kwargs):
         monkeypatch.setattr(owner, step, original)
@@ -181,6 +163,17 @@ def test_what_came_but_was_not_read_yet_counts(
         Timer(0.3, end.set).start()
         return result
 
+    def plan_while_the_wearer_moves(*args, **kwargs):
+        # The second checker is asked only where the wearer has moved.
+        monkeypatch.setattr(in_process_planner, 'plan_question', plan_question)
+        plan, body, moved = plan_question(*args, **kwargs), inputs.body.value, wearer()
+        moved.markers[-1].pose.position.z -= 1e-4
+        stranger.publishers['body_boxes'].publish(moved)
+        wait_until(lambda: inputs.body.value is not body)
+        return plan
+
+    if is_checked:
+        monkeypatch.setattr(in_process_planner, 'plan_question', plan_while_the_wearer_moves)
     monkeypatch.setattr(owner, step, work_while_the_node_is_busy)
     response = stranger.answer()
     assert not response.success
@@ -195,18 +188,32 @@ def test_a_body_that_comes_while_a_motion_is_checked_is_checked_too(
 ):
     planner, stranger = start()
     say_all(planner, stranger)
-    inputs, disagreement = inputs_of(planner), Revalidation.disagreement
-    checked = []
+    inputs, plan_question = inputs_of(planner), in_process_planner.plan_question
+    violation_seen, checked = planner._planner.violation_seen, []
 
-    def check_while_a_body_comes(revalidation, planner):
-        found, body = disagreement(revalidation, planner), inputs.body.value
-        checked.append(body)
-        far = box('far', len(checked), center=(0.0, 0.0, -5.0), size=(0.1, 0.1, 0.1))
-        stranger.publishers['body_boxes'].publish(fenced() if is_in_the_way else array(far))
-        wait_until(lambda: inputs.body.value is not body)
+    def come(body):
+        before = inputs.body.value
+        stranger.publishers['body_boxes'].publish(body)
+        wait_until(lambda: inputs.body.value is not before)
+
+    def moved(by):
+        body = wearer()
+        body.markers[-1].pose.position.z -= by
+        return body
+
+    def plan_while_a_body_comes(*args, **kwargs):
+        plan = plan_question(*args, **kwargs)
+        come(moved(1e-4))
+        return plan
+
+    def check_while_a_body_comes(*args):
+        found = violation_seen(*args)
+        checked.append(args)
+        come(fenced() if is_in_the_way else moved(2e-4))
         return found
 
-    monkeypatch.setattr(Revalidation, 'disagreement', check_while_a_body_comes)
+    monkeypatch.setattr(in_process_planner, 'plan_question', plan_while_a_body_comes)
+    monkeypatch.setattr(planner._planner, 'violation_seen', check_while_a_body_comes)
     message = stranger.answer().message
     # The proof alone decides about that one, and about those that follow.
     assert len(checked) == 1
@@ -235,27 +242,6 @@ def test_no_message_is_processed_while_a_motion_is_published(start, monkeypatch)
     # Then it is, and the monitor stops the arm. Of messages that quick only the last may arrive.
     motion, received = planned[0], stranger.received['joint_trajectory']
     stranger.wait_until(lambda: received and received[-1].points[-1] != motion.points[-1])
-
-
-def test_a_busy_node_publishes_no_motion(start, monkeypatch):
-    monkeypatch.setattr(executor_barrier, 'LONGEST', 0.2)
-    planner, stranger = start()
-    say_all(planner, stranger)
-    end, call = Event(), ExecutorBarrier.call
-
-    def call_a_busy_node(barrier, work):
-        begun = Event()
-        planner.executor.create_task(lambda: begun.set() or end.wait(10.0))
-        assert begun.wait(10.0)
-        try:
-            return call(barrier, work)
-        finally:
-            end.set()
-
-    monkeypatch.setattr(ExecutorBarrier, 'call', call_a_busy_node)
-    message = stranger.answer().message
-    assert message.startswith('SENSOR_INFO_STALE (-24): the node is busy')
-    assert not stranger.received['joint_trajectory']
 
 
 def test_both_checkers_are_asked_when_the_wearer_moved(start, monkeypatch, wait_until, tmp_path):
@@ -316,4 +302,27 @@ def test_a_part_that_stays_about_to_move_into_the_way_ends_the_request(start, mo
     message = stranger.answer().message
     assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): '), message
     assert 'the wearer is about to move into the path of the arm' in message
+    assert not stranger.received['joint_trajectory']
+
+
+def test_a_node_that_cannot_read_all_that_came_publishes_no_motion(start, monkeypatch):
+    monkeypatch.setattr(node_host, 'LONGEST_READING', 0.0)
+    monkeypatch.setattr(node_host, 'SLICE', 0.0)
+    planner, stranger = start()
+    say_all(planner, stranger)
+    plan_question = in_process_planner.plan_question
+
+    def plan_while_the_node_is_busy(*args, **kwargs):
+        plan = plan_question(*args, **kwargs)
+        begun, end = Event(), Event()
+        planner.executor.create_task(lambda: begun.set() or end.wait(10.0))
+        assert begun.wait(10.0)
+        for topic in ('body_boxes', 'joint_states', 'target'):
+            stranger.publishers[topic].publish(TOPICS[topic][1]())
+        Timer(0.3, end.set).start()
+        return plan
+
+    monkeypatch.setattr(in_process_planner, 'plan_question', plan_while_the_node_is_busy)
+    message = stranger.answer().message
+    assert message.startswith('SENSOR_INFO_STALE (-24): the node is busy')
     assert not stranger.received['joint_trajectory']

@@ -20,8 +20,8 @@ from rrth_planner.model.scene import Scene  # noqa: E402
 from rrth_planner.model.status import ErrorCode  # noqa: E402
 from rrth_planner.model.trajectory import Trajectory  # noqa: E402
 from rrth_planner.pipeline import in_process_planner  # noqa: E402
+from rrth_planner.ros.interface.outcome import Outcome  # noqa: E402
 from rrth_planner.ros.requests import request_queue  # noqa: E402
-from rrth_planner.ros.requests.plan_request import PlanOutcome  # noqa: E402
 from samples import fenced, FOLDED, joints  # noqa: E402
 from stranger import _one_try, _start, inputs_of, say_all  # noqa: E402, F401
 
@@ -93,7 +93,8 @@ def stop_for(planner, scene=None):
     over = Trajectory(times=[0.0], positions=[FOLDED], velocities=still, accelerations=still)
     monitor = planner._monitor
     stop = Stop(over, goal, parameters, scene, True, monitor.n_motions)
-    know(monitor, stops=(*monitor.watch.stops, stop))
+    # In the thread that also decides.
+    planner.executor.create_task(know, monitor, stops=(*monitor.watch.stops, stop))
 
 
 def test_after_a_stop_it_plans_again_from_where_the_arm_has_come_to_rest(start, monkeypatch):
@@ -119,19 +120,14 @@ def test_from_a_stop_that_is_proven_free_it_plans_before_the_arm_rests_and_once_
     monkeypatch.setattr(request_queue, 'LONGEST_SETTLING', 30.0)
     planner, stranger = start()
     say_all(planner, stranger, joint_states=joints(velocity=[0.0, 0.3, 0.0, 0.0]))
-    queue, work, tried = planner._queue, planner._queue._work, []
+    tried = []
 
-    def work_in_vain(*arguments):
+    async def plan_in_vain(*_):
         tried.append(bool(inputs_of(planner).joints.value.velocities.any()))
-        return work(*arguments)
+        return Outcome(ErrorCode.PLANNING_FAILED, 'of the test')
 
-    monkeypatch.setattr(queue, '_work', work_in_vain)
-    monkeypatch.setattr(
-        request_queue,
-        'plan_request',
-        lambda *_: PlanOutcome(ErrorCode.PLANNING_FAILED, 'of the test'),
-    )
-    monkeypatch.setattr(queue, '_check_stop', lambda stop: None)
+    monkeypatch.setattr(request_queue, 'plan_request', plan_in_vain)
+    monkeypatch.setattr(planner._planner, 'violation_seen', lambda *_: None)
     stop_for(planner, Scene(()) if is_free else None)
     if is_free:
         stranger.wait_until(lambda: tried)
@@ -195,8 +191,7 @@ def test_after_a_stop_it_plans_for_nothing_once_another_motion_has_begun(start, 
     know(planner._monitor, n_motions=planner._monitor.n_motions + 1)
     stranger.publishers['joint_states'].publish(joints())
     stranger.wait_until(lambda: not planner._queue._open)
-    planner._queue._worker.submit(lambda: None).result(30.0)
-    assert planner._reporter.report.n_requests == 0
+    assert planner._reporter.n_requests == 0
     assert not planner._queue._open
 
 
@@ -207,10 +202,8 @@ def test_a_request_does_not_wait_for_the_rest_of_an_arm_that_was_stopped(start, 
     # No joint state comes that would show it at rest.
     stop_for(planner)
     assert stranger.answer().success
-    # It is reported once it has been answered, by another thread.
-    stranger.wait_until(lambda: planner._reporter.report.n_requests == 1)
-    planner._queue._worker.submit(lambda: None).result(30.0)
-    assert planner._reporter.report.n_requests == 1
+    # It is reported once it has been answered.
+    stranger.wait_until(lambda: planner._reporter.n_requests == 1)
     stranger.wait_until(lambda: not planner._queue._open)
 
 

@@ -6,6 +6,7 @@ The command point_at from outside: beside real nodes, beside half of them, and a
 Most runs are calls of its `main`, as a process takes seconds to load what this one has.
 """
 
+from dataclasses import replace
 from functools import partial
 import gc
 import json
@@ -34,9 +35,14 @@ from rrth_planner.model.errors import MessageError, RrthError  # noqa: E402
 from rrth_planner.model.status import ErrorCode  # noqa: E402
 from rrth_planner.model.trajectory import Trajectory  # noqa: E402
 from rrth_planner.ros.client import dry_run  # noqa: E402
-from rrth_planner.ros.client.answer_parser import Answer, answer_from_text  # noqa: E402
-from rrth_planner.ros.client.follow_motion import announced_motion, follow  # noqa: E402
+from rrth_planner.ros.client.follow_motion import follow  # noqa: E402
 from rrth_planner.ros.client.planner_client import NotInTimeError, PlannerClient  # noqa: E402
+from rrth_planner.ros.messages.answer import (  # noqa: E402
+    Answer,
+    answer_from_msg,
+    answer_from_text,
+    answer_to_msg,
+)
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.body_writer import body_from_file, body_to_msg  # noqa: E402
 from rrth_planner.ros.messages.trajectory import joint_trajectory_to_msg
@@ -238,7 +244,7 @@ def test_an_arm_that_stays_off_the_end_of_its_motion_is_not_waited_for_for_ever(
     client.commanded = [message]
     client._on_state(joints(FOLDED), ARRIVAL)
     with pytest.raises(NotInTimeError, match='is 0.1000 from the end of its motion of 0.10 s'):
-        follow(client, arm, motion, None, 1e-3, Answer(ErrorCode.SUCCESS, '', {}))
+        follow(client, arm, motion, None, 1e-3, Answer(ErrorCode.SUCCESS, ''))
 
 
 @pytest.mark.slow
@@ -351,28 +357,34 @@ def test_an_interrupt_in_mid_step_leaves_no_other_words(client, monkeypatch):
         assert warnings.filters[0][:3:2] == ('ignore', RuntimeWarning)
 
 
-def turn(to, duration):
-    """Return a motion from rest to rest, and its message."""
+def turn(to, duration, begin=0.0):
+    """Return a motion from rest to rest, and its message that starts at a time [s]."""
     motion = Trajectory(
         times=[0.0, duration],
         positions=[FOLDED, to],
         velocities=np.zeros((2, 4)),
         accelerations=np.zeros((2, 4)),
     )
-    return motion, joint_trajectory_to_msg(motion, load_arm().joint_names, '', 0.0)
+    return motion, joint_trajectory_to_msg(motion, load_arm().joint_names, '', begin)
 
 
 def test_a_motion_of_another_machine_is_ignored(client):
     arm = load_arm()
     client.joint_names = arm.joint_names
-    first, message = turn(np.array(FOLDED) + 0.1, 0.1)
-    second, newer = turn(np.array(FOLDED) + 0.2, 0.2)
-    other = JointTrajectory(joint_names=['wheel'])
-    client.commanded = [other]
-    with pytest.raises(NotInTimeError, match='joint_trajectory: nothing for'):
-        announced_motion(client, arm, 0.1)
-    client.commanded = [other, message, other]
-    assert announced_motion(client, arm, 0.1).positions.tolist() == first.positions.tolist()
+    first, message = turn(np.array(FOLDED) + 0.1, 0.1, 100.5)
+    second, newer = turn(np.array(FOLDED) + 0.2, 0.1, 101.5)
+    other = JointTrajectory(header=message.header, joint_names=['wheel'])
+    answer = Answer(ErrorCode.SUCCESS, '', number=3, stamp=100_500_000_000)
+    for stamp, expected in (
+        (answer.stamp, 'joint_trajectory: nothing for'),
+        (None, 'rrth_planner/answer: no stamp of answer 3'),
+    ):
+        client.commanded = [other, newer]
+        with pytest.raises(NotInTimeError, match=expected):
+            client.motion_of(replace(answer, stamp=stamp))
+    # Not the last one, nor by its duration.
+    client.commanded = [other, message, newer]
+    assert client.motion_of(answer).positions.tolist() == first.positions.tolist()
     # Afterwards the planner sends the arm elsewhere, and the other machine gets a motion.
     came = iter([[], [other], [newer, other]])
 
@@ -384,7 +396,7 @@ def test_a_motion_of_another_machine_is_ignored(client):
         client._on_state(joints(FOLDED[:2]), ARRIVAL)
 
     client.take_messages = take_messages
-    follow(client, arm, first, None, 1e-3, Answer(ErrorCode.SUCCESS, '', {}))
+    follow(client, arm, first, None, 1e-3, Answer(ErrorCode.SUCCESS, ''))
     assert client.positions().tolist() == second.positions[-1].tolist()
 
 
@@ -398,25 +410,29 @@ def test_joint_positions_that_are_none_do_not_count(client):
 
 
 def test_an_answer_is_read_back():
-    answer = answer_from_text(
-        'SUCCESS (1): 2 waypoints, duration 1.426 s, path length 1.9430 rad, least clearance '
-        '-0.0389 m, planning time 3.90 ms, seed 1043618065; improvement ended by the time limit; '
-        'request 12'
-    )
-    assert answer.code is ErrorCode.SUCCESS
-    assert answer.figures == {
-        'waypoints': 2,
-        'duration': 1.426,
-        'path_length': 1.943,
-        'least_clearance': -0.0389,
-        'planning_time_ms': 3.9,
-        'seed': 1043618065,
-        'request': 12,
-    }
-    assert answer_from_text('NO_IK_SOLUTION (-31): no, seed 7').figures == {'seed': 7}
+    figures = {'waypoints': 2, 'duration': 1.426, 'path_length': 1.943, 'seed': 1043618065}
+    figures |= {'least_clearance': -0.0389, 'planning_time_ms': 3.9, 'response_time_ms': 12.5}
+    for given in (
+        Answer(ErrorCode.SUCCESS, 'so; answer 12', figures, 12, 1764410692_000000007),
+        Answer(ErrorCode.NO_IK_SOLUTION, 'no; answer 13', {'seed': 7}, 13),
+    ):
+        msg = answer_to_msg('rrth_planner: answer', given)
+        assert answer_from_msg(msg) == given
+        # Without the figures the text says which one it is.
+        assert answer_from_text(given.text) == replace(given, figures={}, stamp=None)
+        assert answer_from_text(msg.message).number == given.number
+    assert 'stamp' not in {pair.key for pair in msg.values}
     for text in ('', 'SUCCESS', 'SUCCESS (2): what'):
         with pytest.raises(MessageError, match='expected NAME'):
             answer_from_text(text)
+    for pair, value in ((msg.values[0], 'many'), (msg.values[-1], '1.5 apples')):
+        pair.value, before = value, pair.value
+        with pytest.raises(MessageError, match='expected an answer'):
+            answer_from_msg(msg)
+        pair.value = before
+    msg.values.clear()
+    with pytest.raises(MessageError, match='expected an answer'):
+        answer_from_msg(msg)
 
 
 def test_a_body_of_either_layout_is_the_same_body():

@@ -1,8 +1,10 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The queue of requests: what is withdrawn and refused while its worker goes on."""
+"""The queue of requests: their turns, and what is withdrawn, refused and answered for."""
 
-import sys
+from dataclasses import replace
+from threading import Event
+import time
 
 import numpy as np
 import pytest
@@ -23,6 +25,7 @@ from rrth_planner.ros.interface.reporter import Reporter  # noqa: E402
 from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
 from rrth_planner.ros.messages.marker_edits import BodyPart  # noqa: E402
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor  # noqa: E402
+from rrth_planner.ros.requests.node_host import NodeHost  # noqa: E402
 from rrth_planner.ros.requests.request_queue import MOST_WAITING, PlanQueue  # noqa: E402
 import worlds  # noqa: E402
 
@@ -32,7 +35,7 @@ GOAL = PointingGoal(np.array([1.5, 0.1, 0.3]))
 
 @pytest.fixture(name='queue')
 def _queue():
-    """Give the queue of a node that nobody spins: its worker publishes, too."""
+    """Give the queue of a node that the test spins by hand."""
     node = Node('queue')
     inputs, parameters = Inputs('body', 'target', 'joints'), without_separation(node)
     now = node.get_clock().now().nanoseconds * 1e-9
@@ -43,61 +46,76 @@ def _queue():
     inputs.body.measured = inputs.joints.measured = now
     publishers, reporter = PlanPublishers(node, NEVER), Reporter(node, inputs, parameters)
     monitor = ExecutionMonitor(node, inputs, reporter, publishers)
-    queue = PlanQueue(node, inputs, reporter, publishers, monitor, InProcessPlanner())
+    host = NodeHost(node, InProcessPlanner())
+    queue = PlanQueue(host, inputs, reporter, publishers, monitor)
+    queue.host, queue.reporter = host, reporter
     yield queue
     queue.close()
     node.destroy_node()
 
 
 def ask(queue, goal):
-    """Begin a request, and return what is to be resumed until it is answered."""
-    request = queue.respond(goal)
-    request.send(None)
-    return request
+    """Begin a request, and return the future of its outcome."""
+    return queue.host.future_of(queue.respond(goal))
 
 
-def resumed(requests):
-    """Resume what waits; return the answers that have come, and the others."""
-    answers, waiting = [], []
-    for request in requests:
-        try:
-            request.send(None)
-            waiting.append(request)
-        except StopIteration as end:
-            answers.append(end.value)
-    return answers, waiting
+def outcomes_of(queue, requests):
+    """Return how some requests end."""
+    end = time.monotonic() + 30.0
+    while not all(request.done() for request in requests):
+        assert time.monotonic() < end
+        queue.host.go_on()
+        time.sleep(1e-4)
+    return [request.result() for request in requests]
 
 
-def test_a_goal_is_withdrawn_while_the_worker_ends_others(queue):
-    goals = [PointingGoal(GOAL.target + [0.0, 0.0, 1e-3 * k]) for k in range(60)]
-    waiting, answers, interval = [ask(queue, goal) for goal in goals], [], sys.getswitchinterval()
-    # The threads take turns within each other's loops.
-    sys.setswitchinterval(1e-6)
-    try:
-        while waiting:
-            for _ in range(200):
-                queue.withdraw(GOAL)
-            new, waiting = resumed(waiting)
-            answers += new
-    finally:
-        sys.setswitchinterval(interval)
-    assert len(answers) == len(goals)
-    assert sum(answer.is_solved for answer in answers) > 0
+def test_a_goal_that_is_withdrawn_is_planned_for_no_more(queue):
+    goals = [PointingGoal(GOAL.target + [0.0, 0.0, 1e-3 * k]) for k in range(6)]
+    waiting = [ask(queue, goal) for goal in goals]
+    assert all(queue.pursues(goal) for goal in goals)
+    for goal in goals[::2]:
+        queue.withdraw(goal)
+    outcomes = outcomes_of(queue, waiting)
+    assert [outcome.code is ErrorCode.PREEMPTED for outcome in outcomes] == 3 * [True, False]
+    assert outcomes[1].trajectory is not None
+    assert not any(queue.pursues(goal) for goal in goals)
+
+
+def test_requests_are_answered_in_turn(queue):
+    order = []
+
+    async def note(k):
+        await queue.respond(PointingGoal(GOAL.target + [0.0, 0.0, 1e-3 * k]))
+        order.append(k)
+
+    outcomes_of(queue, [queue.host.future_of(note(k)) for k in range(10)])
+    assert order == list(range(10))
 
 
 def test_more_requests_than_may_wait_are_refused_at_once(queue):
     waiting = [ask(queue, GOAL) for _ in range(MOST_WAITING)]
-    with pytest.raises(StopIteration) as end:
-        queue.respond(GOAL).send(None)
-    refused = end.value.value
-    assert not refused.is_solved
+    refused = ask(queue, GOAL).result()
     assert refused.code is ErrorCode.PREEMPTED
     assert refused.sentence.startswith(f'{MOST_WAITING} requests wait for their answers already')
     queue.cancel()
-    while waiting:
-        _, waiting = resumed(waiting)
+    outcomes_of(queue, waiting)
     # There is room again.
-    waiting = [ask(queue, GOAL)]
-    while waiting:
-        answers, waiting = resumed(waiting)
-    assert answers[0].sentence != refused.sentence
+    (outcome,) = outcomes_of(queue, [ask(queue, GOAL)])
+    assert outcome.sentence != refused.sentence
+
+
+def test_a_planner_that_hangs_is_answered_for(queue, monkeypatch):
+    monkeypatch.setattr('rrth_planner.ros.requests.node_host.LONGEST_ANSWER', 0.0)
+    end = Event()
+
+    def hang(*_):
+        end.wait(30.0)
+
+    options = replace(queue.reporter.parameters.options, time_limit=0.1)
+    queue.reporter.parameters = replace(queue.reporter.parameters, options=options)
+    monkeypatch.setattr(InProcessPlanner, 'plan', hang)
+    outcomes = outcomes_of(queue, [ask(queue, GOAL) for _ in range(2)])
+    end.set()
+    for outcome in outcomes:
+        assert outcome.code is ErrorCode.FAILURE
+        assert 'the planner has not answered within 0.1 s' in outcome.sentence

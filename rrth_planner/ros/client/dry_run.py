@@ -6,15 +6,18 @@ from geometry_msgs.msg import PointStamped
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.errors import MessageError
 from rrth_planner.model.status import ErrorCode
+from rrth_planner.pipeline.host import BlockingHost, completed
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner
-from rrth_planner.ros.client.answer_parser import Answer, answer_from_text
 from rrth_planner.ros.client.planner_client import PlannerClient
 from rrth_planner.ros.interface.inputs import Inputs
+from rrth_planner.ros.interface.outcome import Outcome
 from rrth_planner.ros.interface.parameters import in_effect, PlannerParameters
 from rrth_planner.ros.interface.scene_monitor import SceneMonitor
+from rrth_planner.ros.messages.answer import Answer
 from rrth_planner.ros.messages.body import WearerBody
-from rrth_planner.ros.messages.error_codes import answer, code_of_rejection
+from rrth_planner.ros.messages.error_codes import code_of_rejection
 from rrth_planner.ros.requests.plan_request import plan_request
+from rrth_planner.ros.requests.revalidation import Revalidation
 from visualization_msgs.msg import MarkerArray
 
 
@@ -48,24 +51,21 @@ def plan_without_moving(
         goal = scene_monitor.goal(target)
     except MessageError as problem:
         code = code_of_rejection(problem, ErrorCode.INVALID_GOAL_CONSTRAINTS)
-        return Answer(code, str(problem), {}), None
+        return Answer(code, str(problem)), None
 
     def now() -> float:
         return client.get_clock().now().nanoseconds * 1e-9
 
     if body is not None:
         inputs.body.accept(lambda: WearerBody().apply(body, now(), parameters.base_frame), now())
+
     # Not published, a motion counts as long as it could be.
-    outcome = plan_request(
-        inputs,
-        in_effect(parameters, inputs.source),
-        now,
-        planner,
-        lambda: False,
-        lambda _, revalidation: not revalidation.is_late(),
-        goal,
-    )
+    async def in_time(outcome: Outcome, revalidation: Revalidation) -> Outcome | None:
+        return None if revalidation.is_late() else outcome
+
+    host, present = BlockingHost(planner, now), in_effect(parameters, inputs.source)
+    outcome = completed(plan_request(host, inputs, present, lambda: False, in_time, goal))
     error = None
     if outcome.trajectory is not None:
         error = pointing_error(parameters.arm, outcome.trajectory.positions[-1], goal.target)
-    return answer_from_text(answer(outcome.code, outcome.sentence)), error
+    return outcome.answer, error

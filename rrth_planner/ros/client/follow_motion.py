@@ -2,44 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """Follow an arm to the end of its commanded motion, with a progress bar."""
 
-from collections.abc import Sequence
-from contextlib import suppress
 import time
 
 import numpy as np
 from rrth_planner.model.arm import ArmModel, pointing_error
 from rrth_planner.model.arrays import Array
-from rrth_planner.model.errors import MessageError
 from rrth_planner.model.trajectory import positions_at, Trajectory
-from rrth_planner.ros.client.answer_parser import Answer
-from rrth_planner.ros.client.planner_client import NotInTimeError, PlannerClient
+from rrth_planner.ros.client.planner_client import motions_of, NotInTimeError, PlannerClient
+from rrth_planner.ros.messages.answer import Answer
 from rrth_planner.ros.messages.joint_state import gaps_between
-from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg
 from tqdm import tqdm  # type: ignore[import-untyped]
-from trajectory_msgs.msg import JointTrajectory
 
 # A motion that points so far past the target was planned for another one [m].
 OTHER_TARGET = 1e-3
-# Durations of a motion in an answer and in its message are as close as that; what a moving arm was
-# commanded before it takes at most so long [s].
-SAME_DURATION, LONGEST_LEAD_IN = 2e-3, 2.0
 # An arm that has arrived stays there for so long [s].
 SETTLED = 0.1
 # And moves no faster [rad/s].
 REST_SPEED = 0.01
 SPACING = 0.01
-
-
-def announced_motion(client: PlannerClient, arm: ArmModel, duration: float) -> Trajectory:
-    """Return the motion of an answer with this duration [s], once it was received."""
-
-    def received() -> list[Trajectory]:
-        # The motion of an earlier request, latched on the topic, may come first.
-        motions = _motions_of(client.commanded, arm)
-        return [m for m in motions if _is_of_duration(m, duration)]
-
-    client.wait_for(lambda: bool(received()), client.resolve_topic_name('joint_trajectory'))
-    return received()[-1]
 
 
 def follow(
@@ -73,7 +53,7 @@ def follow(
         while present - begin <= motion.duration + client.timeout:
             client.take_messages(0.02)
             present = time.monotonic()
-            newer = _motions_of(client.commanded[n_commanded:], arm)
+            newer = motions_of(client.commanded[n_commanded:], arm.joint_names)
             n_commanded = len(client.commanded)
             if newer:
                 # The wearer moved, and the planner stopped the arm or replanned.
@@ -105,26 +85,6 @@ def follow(
         f'{motion.duration:.2f} s, expected at most {tolerance:g} [rad] and an arm at rest within '
         f'{client.timeout:g} s more{hint}'
     )
-
-
-def _is_of_duration(motion: Trajectory, duration: float) -> bool:
-    """Return whether a motion takes so long [s], after the rest or motion that it begins with."""
-    begins_at_rest = len(motion.times) > 1 and not (
-        motion.velocities[:2].any() or np.ptp(motion.positions[:2], axis=0).any()
-    )
-    longer = motion.duration - duration
-    if begins_at_rest:
-        return abs(longer - motion.times[1]) < SAME_DURATION or abs(longer) < SAME_DURATION
-    return -SAME_DURATION < longer < LONGEST_LEAD_IN * motion.velocities[0].any() + SAME_DURATION
-
-
-def _motions_of(commanded: Sequence[JointTrajectory], arm: ArmModel) -> list[Trajectory]:
-    """Return the motions of this arm; the topic may carry those of others, or invalid ones."""
-    motions = []
-    for msg in commanded:
-        with suppress(MessageError):
-            motions.append(joint_trajectory_from_msg(msg, arm.joint_names))
-    return motions
 
 
 def _time_along(motion: Trajectory, q: Array) -> float:

@@ -3,7 +3,7 @@
 """Clients of a planner: nodes that publish body and target, request motions, follow the arm."""
 
 import asyncio
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import suppress
 from functools import partial
 import time
@@ -30,14 +30,15 @@ from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import MessageError, one_line, RrthError
 from rrth_planner.model.status import ErrorCode
 from rrth_planner.model.trajectory import Trajectory
-from rrth_planner.ros.client.answer_parser import Answer, answer_from_text
 from rrth_planner.ros.interface.parameters import (
     declared,
     parameters_from_values,
     PlannerParameters,
 )
 from rrth_planner.ros.interface.separation_status import separation_from_msg
+from rrth_planner.ros.messages.answer import Answer, answer_from_msg, answer_from_text
 from rrth_planner.ros.messages.diagnostics import GIVEN_UP_KEY, REQUEST_KEY
+from rrth_planner.ros.messages.fields import nanoseconds_of
 from rrth_planner.ros.messages.joint_state import (
     configuration_from_msg,
     gaps_between,
@@ -46,7 +47,7 @@ from rrth_planner.ros.messages.joint_state import (
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg
 from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscription
 from rrth_planner.ros.middleware.parameter_declaration import ARM
-from rrth_planner.ros.middleware.qos import LATCHED, SERVICE
+from rrth_planner.ros.middleware.qos import ANSWERED, LATCHED, SERVICE
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
@@ -59,7 +60,14 @@ NODE = 'rrth_planner'
 # What a client sends.
 TOPICS = {MarkerArray: 'body_boxes', PointStamped: 'target'}
 # Codes of a planner that lacks an input, or a recent one: that may come a moment later.
-LACKS_INPUT = ('UNABLE_TO_AQUIRE_SENSOR_DATA', 'SENSOR_INFO_STALE', 'ROBOT_STATE_STALE')
+LACKS_INPUT = (
+    ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA,
+    ErrorCode.SENSOR_INFO_STALE,
+    ErrorCode.ROBOT_STATE_STALE,
+)
+# The figures of an answer come before it, by another way; they are waited for so long [s], and so
+# many answers, those to others included, are remembered.
+LONGEST_FIGURES, REMEMBERED = 1.0, 1000
 # Between two requests to a planner that lacks an input [s].
 PAUSE = 0.3
 # What changes nothing is asked for again where no answer has come for so long [s].
@@ -142,6 +150,9 @@ class PlannerClient(Node):
         self.level, self.message = DiagnosticStatus.OK, ''
         self._request, self._given_up = 0, ''
         self._planner = self.resolve_service_name(NODE).lstrip('/')
+        # By their texts.
+        self._answers: dict[str, Answer] = {}
+        self.create_subscription(DiagnosticStatus, f'{NODE}/answer', self._on_answer, ANSWERED)
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
         # It may wait among many others, whose answers it receives, too.
         self._plan = self.create_client(Trigger, f'{NODE}/plan', qos_profile=SERVICE)
@@ -204,10 +215,9 @@ class PlannerClient(Node):
         Known while messages are received, as in `wait_for`, a tenth of a second later at most.
         After arrival it is ''.
         """
-        request = answer.figures.get('request')
-        if request is None or self._request < request:
+        if not answer.number or self._request < answer.number:
             return ''
-        if self._request > request:
+        if self._request > answer.number:
             return 'the motion of another request has replaced the one to this target'
         return self._given_up
 
@@ -216,6 +226,13 @@ class PlannerClient(Node):
         why = self.why_given_up(answer)
         if why:
             raise GivenUpError(f'the planner has given this target up: {why}')
+
+    def _on_answer(self, msg: DiagnosticStatus) -> None:
+        with suppress(MessageError):
+            answer = answer_from_msg(msg)
+            self._answers[answer.text] = answer
+            if len(self._answers) > REMEMBERED:
+                del self._answers[next(iter(self._answers))]
 
     def _on_diagnostics(self, msg: DiagnosticArray) -> None:
         for status in msg.status:
@@ -240,8 +257,25 @@ class PlannerClient(Node):
         service = self.resolve_service_name(f'{NODE}/plan')
         yield self._plan.service_is_ready, f'service {service}'
         yield from self._publish(target)
-        response = yield from self._ask(patience)
-        return answer_from_text(response.message)
+        return (yield from self._ask(patience))
+
+    def motion_of(self, answer: Answer) -> Trajectory:
+        """
+        Return the motion of an answer, once it was received.
+
+        Raises NotInTimeError where it does not come, or its stamp has not come with the answer.
+        """
+        if answer.stamp is None:
+            topic = self.resolve_topic_name(f'{NODE}/answer')
+            raise NotInTimeError(f'{topic}: no stamp of answer {answer.number}, expected one')
+
+        def received() -> list[Trajectory]:
+            stamped = (m for m in self.commanded if nanoseconds_of(m.header.stamp) == answer.stamp)
+            return motions_of(stamped, self.joint_names)
+
+        topic = self.resolve_topic_name('joint_trajectory')
+        self.wait_for(lambda: bool(received()), topic)
+        return received()[0]
 
     def wait_for(
         self, condition: Callable[[], bool], what: str, timeout: float | None = None
@@ -301,20 +335,26 @@ class PlannerClient(Node):
             return False
         return bool((np.abs(reading.mean_velocities()) <= speed).all())
 
-    def ask(self, patience: float) -> Trigger.Response:
+    def ask(self, patience: float) -> Answer:
         """Return the planner's answer; ask again while it lacks a recent input, for a time [s]."""
         return self._run(self._ask(patience), self.timeout)
 
-    def _ask(self, patience: float) -> Waits[Trigger.Response]:
+    def _ask(self, patience: float) -> Waits[Answer]:
         end = time.monotonic() + patience
         while True:
             future = self._plan.call_async(Trigger.Request())
             yield future.done, 'an answer of rrth_planner/plan'
-            answer = future.result()
-            now = time.monotonic()
-            if not answer.message.startswith(LACKS_INPUT) or now >= end:
-                return answer
+            answer, now = answer_from_text(future.result().message), time.monotonic()
+            if answer.code not in LACKS_INPUT or now >= end:
+                return (yield from self._with_figures(answer))
             yield partial(_is_later, now + PAUSE), 'an input of the planner'
+
+    def _with_figures(self, answer: Answer) -> Waits[Answer]:
+        """Return an answer with its figures, if they come."""
+        # A planner that is just found may have published them before.
+        end, text = time.monotonic() + LONGEST_FIGURES, answer.text
+        yield lambda: text in self._answers or _is_later(end), 'the figures of an answer'
+        return self._answers.get(text, answer)
 
     def count_arms(self) -> int:
         """Return the number of other subscribers of the motions."""
@@ -377,7 +417,7 @@ class DemoClient(PlannerClient):
         The arm is at rest at a speed of at most `still` [rad/s]; its servos settle in a time [s].
         """
         super().__init__('rrth_demo', timeout, check)
-        self._answer = Answer(ErrorCode.FAILURE, '', {})
+        self._answer = Answer(ErrorCode.FAILURE, '')
         self.arm, self._still, self._settling = arm, still, settling
         # As `see_separation` keeps them; statuses with the time when they were sent [s].
         self.bodies: list[bytes] = []
@@ -393,16 +433,13 @@ class DemoClient(PlannerClient):
     def ask_for_motion(self) -> tuple[Trajectory, float]:
         """Return the motion that the planner publishes, and its planning time [ms]."""
         self.commanded, self.observed = [], []
-        response = self.ask(self.timeout)
-        if not response.success:
-            raise DemoError(f'the planner rejected the request: {response.message}')
-        self.wait_for(lambda: bool(self.commanded), 'joint_trajectory')
-        self._answer = answer_from_text(response.message)
-        figures = self._answer.figures
+        answer = self._answer = self.ask(self.timeout)
+        if answer.code is not ErrorCode.SUCCESS:
+            raise DemoError(f'the planner rejected the request: {answer.text}')
+        figures = answer.figures
         if 'planning_time_ms' not in figures:
-            raise DemoError(f'no planning time in the answer "{response.message}"')
-        trajectory = joint_trajectory_from_msg(self.commanded[-1], self.joint_names)
-        return trajectory, figures['planning_time_ms']
+            raise DemoError(f'no planning time came with the answer "{answer.text}"')
+        return self.motion_of(answer), figures['planning_time_ms']
 
     def wait_for_arrival(self, trajectory: Trajectory, q_aims: Callable[[Array], bool]) -> None:
         """
@@ -459,7 +496,7 @@ class DemoClient(PlannerClient):
         end = time.monotonic() + self.timeout
         sentence = 'none was planned'
         while time.monotonic() < end:
-            sentence = self.ask(self.timeout).message
+            sentence = self.ask(self.timeout).text
             moved = time.monotonic()
             # The planner may be about to go on: it is asked once it leaves the arm at rest.
             while time.monotonic() - moved < PAUSE:
@@ -491,6 +528,15 @@ def _late(what: str, timeout: float) -> NotInTimeError:
 def _is_later(end: float) -> bool:
     """Return whether the monotonic clock is past a time [s]."""
     return time.monotonic() >= end
+
+
+def motions_of(messages: Iterable[JointTrajectory], names: Sequence[str]) -> list[Trajectory]:
+    """Return the motions of these joints; a topic may carry those of others, or invalid ones."""
+    motions = []
+    for msg in messages:
+        with suppress(MessageError):
+            motions.append(joint_trajectory_from_msg(msg, names))
+    return motions
 
 
 def is_matched(node: Node, publisher: Publisher) -> bool:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The publishers of the planner: motions, and what RViz shows of them."""
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from nav_msgs.msg import Path
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks
@@ -11,9 +12,10 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.ros.interface.parameters import ALWAYS, NEVER, PlannerParameters
+from rrth_planner.ros.messages.answer import Answer, answer_to_msg
 from rrth_planner.ros.messages.plan_markers import plan_markers
 from rrth_planner.ros.messages.trajectory import joint_trajectory_to_msg, tool_path_to_msg
-from rrth_planner.ros.middleware.qos import COMMANDED, COMMITTED, LATCHED, RAY_CLEAR
+from rrth_planner.ros.middleware.qos import ANSWERED, COMMANDED, COMMITTED, LATCHED, RAY_CLEAR
 from std_msgs.msg import Bool
 from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
@@ -35,6 +37,7 @@ class PlanPublishers:
             self.separate()
         else:
             self._whole = node.create_publisher(JointTrajectory, 'joint_trajectory', COMMANDED)
+        self._answers = node.create_publisher(DiagnosticStatus, '~/answer', ANSWERED)
         self._planned = self._ray_clear = None
         if separates != NEVER:
             name = '~/planned_trajectory'
@@ -86,6 +89,11 @@ class PlanPublishers:
         """Publish the message of a planned motion to be seen, with separation."""
         if self._planned is not None:
             self._planned.publish(msg)
+
+    def publish_answer(self, answer: Answer) -> None:
+        """Publish an answer with its figures."""
+        name = f'{self._node.get_fully_qualified_name().lstrip("/")}: answer'
+        self._answers.publish(answer_to_msg(name, answer))
 
     @property
     def motion_topic(self) -> str:

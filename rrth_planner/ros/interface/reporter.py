@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Report the outcomes of requests and the state of the monitor: log and diagnostics."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from threading import Lock
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -18,11 +17,12 @@ from rrth_planner.model.separation import governing_speed, SeparationRules
 from rrth_planner.model.status import ErrorCode
 from rrth_planner.ros.interface.figures import Figures
 from rrth_planner.ros.interface.inputs import Inputs
+from rrth_planner.ros.interface.outcome import Outcome
 from rrth_planner.ros.interface.parameters import in_effect, PlannerParameters
 from rrth_planner.ros.interface.separation_status import LEVELS, NO_PROMISE, separation_to_msg
+from rrth_planner.ros.messages.answer import FIGURES, figures_shown
 from rrth_planner.ros.messages.body import WearerBody
 from rrth_planner.ros.messages.diagnostics import GIVEN_UP_KEY, REQUEST_KEY, status_to_msg
-from rrth_planner.ros.messages.error_codes import answer
 from rrth_planner.ros.middleware.qos import LATCHED
 
 # Diagnostics are published at least this often [s].
@@ -44,40 +44,8 @@ MOST_SPEEDS = 100
 MOST_NAMED = 1000
 # Changes are published at most this often; the last one always is [s].
 SHORTEST_PERIOD = 0.1
-
-
-@dataclass(frozen=True, slots=True)
-class PlanReport:
-    """
-    The figures of the requests so far, and of the last one.
-
-    Parameters
-    ----------
-    code : ErrorCode or None
-        Of the last request; None before the first.
-    planning_time : float
-        Of the plan itself [s].
-    response_time : float
-        From the request, its turn included, to the published trajectory [s].
-    duration : float
-        Of the motion [s].
-    length : float
-        Of the path [rad].
-    clearance : float
-        The least along the motion [m].
-
-    """
-
-    n_requests: int = 0
-    n_solved: int = 0
-    code: ErrorCode | None = None
-    sentence: str = ''
-    seed: int = -1
-    planning_time: float = float('nan')
-    response_time: float = float('nan')
-    duration: float = float('nan')
-    length: float = float('nan')
-    clearance: float = float('nan')
+# The figures of a plan that is not known.
+UNKNOWN = {key: 'nan' for key, _ in FIGURES.values()} | {'seed': '-1', 'waypoints': '0'}
 
 
 class Reporter:
@@ -86,7 +54,9 @@ class Reporter:
     def __init__(self, node: Node, inputs: Inputs, parameters: PlannerParameters) -> None:
         """Advertise `/diagnostics`; the owner keeps `self.parameters` up to date."""
         self._given = parameters
-        self.report = PlanReport()
+        # How the last request ended, how many did, and how many of those with a motion.
+        self.last: Outcome | None = None
+        self.n_requests = self.n_solved = 0
         self._node, self._inputs = node, inputs
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
         # The state of the monitor, its reason, and the level of that.
@@ -106,8 +76,6 @@ class Reporter:
         if parameters.separation is not None:
             self._state = node.create_publisher(DiagnosticStatus, '~/state', LATCHED)
             self._publish_state()
-        # Held while the threads of executor and worker count and publish.
-        self._lock = Lock()
         self._published = -SHORTEST_PERIOD
         self._is_changed = False
         self._named: set[tuple[str, int]] = set()
@@ -130,28 +98,23 @@ class Reporter:
 
     def remaining_motion_checked(self, elapsed: float) -> None:
         """Count a check of the remaining motion against a new body, and its time [s]."""
-        with self._lock:
-            self._remaining_motion_checks.add(elapsed)
+        self._remaining_motion_checks.add(elapsed)
 
     def stop_published(self, elapsed: float) -> None:
         """Count a fail-safe stop, and how long after the body's arrival it was published [s]."""
-        with self._lock:
-            self._stops_published.add(elapsed)
+        self._stops_published.add(elapsed)
 
     def body_used(self, age: float) -> None:
         """Count a decision, to publish a motion or to go on with one, by the body's age [s]."""
-        with self._lock:
-            self._body_ages.add(age)
+        self._body_ages.add(age)
 
     def commitment_published(self, elapsed: float) -> None:
         """Count a published commitment, and what it took to find and prove it [s]."""
-        with self._lock:
-            self._commitments.add(elapsed)
+        self._commitments.add(elapsed)
 
     def body_observed(self, body: BodyMotion) -> None:
         """Keep what is known of the wearer's speeds, and log who was faster than assumed."""
-        with self._lock:
-            self._body = body
+        self._body = body
         if body.faster:
             named = ', '.join(f'{one_line(name)}: {v:.1f} m/s' for name, v in body.faster)
             self._node.get_logger().warning(
@@ -221,9 +184,8 @@ class Reporter:
 
     def incident(self, file: Path | None) -> None:
         """Count an incident, and keep the name of its file if there is one."""
-        with self._lock:
-            self._n_incidents += 1
-            self._last_incident = '' if file is None else str(file)
+        self._n_incidents += 1
+        self._last_incident = '' if file is None else str(file)
 
     def publish_soon(self) -> None:
         """Publish the diagnostics within a tenth of a second."""
@@ -246,30 +208,24 @@ class Reporter:
             self._publish_state()
 
     def _publish(self) -> None:
-        with self._lock:
-            self._published, self._is_changed = time.monotonic(), False
-            now = self._node.get_clock().now()
-            self._warn_of_lost(now.nanoseconds * 1e-9)
-            self._warn_of_publishers()
-            msg = DiagnosticArray(status=[self._status(now.nanoseconds * 1e-9)])
-            msg.header.stamp = now.to_msg()
-            self._publisher.publish(msg)
+        self._published, self._is_changed = time.monotonic(), False
+        now = self._node.get_clock().now()
+        self._warn_of_lost(now.nanoseconds * 1e-9)
+        self._warn_of_publishers()
+        msg = DiagnosticArray(status=[self._status(now.nanoseconds * 1e-9)])
+        msg.header.stamp = now.to_msg()
+        self._publisher.publish(msg)
 
     def _status(self, now: float) -> DiagnosticStatus:
-        report, body = self.report, self._inputs.body.value.at(now)
+        last, body = self.last, self._inputs.body.value.at(now)
         monitor, reason = self.monitor_state
-        code = '' if report.code is None else f'{report.code.name} ({report.code.value})'
         values: dict[str, object] = {
-            'last code': code,
-            'last sentence': report.sentence,
-            'requests': report.n_requests,
-            'solved': report.n_solved,
-            'seed': report.seed,
-            'planning time [ms]': f'{report.planning_time * 1e3:.3f}',
-            'request to trajectory [ms]': f'{report.response_time * 1e3:.3f}',
-            'duration [s]': f'{report.duration:.3f}',
-            'path length [rad]': f'{report.length:.4f}',
-            'least clearance [m]': f'{report.clearance:.4f}',
+            'last code': '' if last is None else f'{last.code.name} ({last.code.value})',
+            'last sentence': '' if last is None else last.sentence,
+            'requests': self.n_requests,
+            'solved': self.n_solved,
+            **UNKNOWN,
+            **figures_shown({} if last is None else last.answer.figures),
             'boxes': body.n_boxes,
             'publishers of the body': self._n_publishers,
             'subscribers of motions': self._node.count_subscribers('joint_trajectory'),
@@ -292,7 +248,7 @@ class Reporter:
             values[f'good messages, {name}'] = topic.n_good
             values[f'rejected messages, {name}'] = topic.n_rejected
             values[f'last rejection, {name}'] = topic.rejection or ''
-        level, message = summary(now, self._inputs, self.parameters, report)
+        level, message = summary(now, self._inputs, self.parameters, last)
         monitored = self.monitor_level, self.monitor_state[1]
         separated = LEVELS[self._published_state.state], self._published_state.text
         found = [(level, message), monitored, separated]
@@ -345,38 +301,30 @@ class Reporter:
 
     def reject(self, code: ErrorCode, sentence: str) -> None:
         """Log and publish the rejection of a request."""
-        self.conclude(code, sentence, PlanReport())
+        self.conclude(Outcome(code, sentence))
 
-    def conclude(self, code: ErrorCode, sentence: str, figures: PlanReport) -> str:
-        """Log and publish how a request ended, and return the answer to it."""
-        is_solved = code is ErrorCode.SUCCESS
-        with self._lock:
-            self.report = replace(
-                figures,
-                n_requests=self.report.n_requests + 1,
-                n_solved=self.report.n_solved + is_solved,
-                code=code,
-                sentence=one_line(sentence),
-            )
-        return self._announce(code, sentence)
+    def conclude(self, outcome: Outcome) -> None:
+        """Log and publish how a request ended."""
+        self.last = outcome
+        self.n_requests += 1
+        self.n_solved += outcome.code is ErrorCode.SUCCESS
+        self._announce(outcome)
 
-    def revise(self, code: ErrorCode, sentence: str) -> str:
-        """Log and publish what became of the last request, and return that as an answer."""
-        with self._lock:
-            self.report = replace(self.report, code=code, sentence=one_line(sentence))
-        return self._announce(code, sentence)
+    def revise(self, code: ErrorCode, sentence: str) -> None:
+        """Log and publish what became of the last request."""
+        self.last = replace(self.last or Outcome(code, ''), code=code, sentence=sentence)
+        self._announce(self.last)
 
-    def _announce(self, code: ErrorCode, sentence: str) -> str:
-        text = answer(code, sentence)
+    def _announce(self, outcome: Outcome) -> None:
         logger = self._node.get_logger()
-        if code is ErrorCode.SUCCESS:
-            logger.info(text)
-        elif code is ErrorCode.FAILURE:
-            logger.error(text)
+        # Three calls: rclpy raises where one line of code logs at changing severities.
+        if outcome.code is ErrorCode.SUCCESS:
+            logger.info(outcome.text)
+        elif outcome.code is ErrorCode.FAILURE:
+            logger.error(outcome.text)
         else:
-            logger.warning(text)
+            logger.warning(outcome.text)
         self.publish()
-        return text
 
 
 def speeds_shown(body: BodyMotion, now: float, rules: SeparationRules) -> str:
@@ -391,11 +339,11 @@ def speeds_shown(body: BodyMotion, now: float, rules: SeparationRules) -> str:
 
 
 def summary(
-    now: float, inputs: Inputs, parameters: PlannerParameters, report: PlanReport
+    now: float, inputs: Inputs, parameters: PlannerParameters, last: Outcome | None
 ) -> tuple[bytes, str]:
     """Return level and message of the planner's diagnostics at a time [s]."""
-    if report.code is ErrorCode.FAILURE:
-        return DiagnosticStatus.ERROR, answer(report.code, report.sentence)
+    if last is not None and last.code is ErrorCode.FAILURE:
+        return DiagnosticStatus.ERROR, last.text
     timeouts = ((inputs.body, parameters.body_timeout), (inputs.joints, parameters.joint_timeout))
     for topic, timeout in timeouts:
         if timeout > 0.0 and topic.measured is not None and topic.age(now) > timeout:
@@ -406,8 +354,8 @@ def summary(
     missing = [topic.topic for topic in inputs.all.values() if topic.measured is None]
     if missing:
         return DiagnosticStatus.WARN, f'waiting for {", ".join(missing)}'
-    if report.code not in (None, ErrorCode.SUCCESS):
-        return DiagnosticStatus.WARN, answer(report.code, report.sentence)
+    if last is not None and last.code is not ErrorCode.SUCCESS:
+        return DiagnosticStatus.WARN, last.text
     if parameters.stands_still:
         return DiagnosticStatus.WARN, NO_PROMISE
-    return DiagnosticStatus.OK, report.sentence or 'ready'
+    return DiagnosticStatus.OK, 'ready' if last is None else one_line(last.sentence)

@@ -144,6 +144,15 @@ INTERFACES = {
             'for tools whose beam matters; never beside a body that stands still',
             separation=('auto', True),
         ),
+        _published(
+            '~/answer',
+            'diagnostic_msgs/msg/DiagnosticStatus',
+            'each answer, before the service sends it: `message` as there, and by key `answer`, '
+            'its number, with which the sentence of `~/plan` ends (`answer 12`), `code`, and of a '
+            'motion the figures and `stamp`, which the header of its message has, on '
+            '`joint_trajectory`, or with `separation` on `~/planned_trajectory`: seconds with '
+            'nine decimals',
+        ),
         _published('~/tool_path', 'nav_msgs/msg/Path', 'latched: the path of the tool'),
         _published(
             '~/markers',
@@ -154,8 +163,8 @@ INTERFACES = {
             '/diagnostics',
             DIAGNOSTICS,
             '1 Hz and on change: inputs, the last answer, what the monitor does, whether the arm '
-            'follows; `request`: the number of the last request with a motion, as its answer has '
-            'it, `given up`: why its goal is not pursued any more, if the arm has not arrived',
+            'follows; `request`: the number of the last answer with a motion, `given up`: why its '
+            'goal is not pursued any more, if the arm has not arrived',
         ),
     ),
     'arm_playback': (

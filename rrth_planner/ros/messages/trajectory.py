@@ -5,7 +5,6 @@
 from array import array
 from collections.abc import Sequence
 from itertools import pairwise
-import math
 from typing import Any
 
 from geometry_msgs.msg import PoseStamped
@@ -16,7 +15,13 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import MessageError, RrthError
 from rrth_planner.model.rotation import quaternion_xyzw
 from rrth_planner.model.trajectory import sample, Trajectory
-from rrth_planner.ros.messages.fields import NANOSECONDS, nanoseconds_of, numbers, seconds_of
+from rrth_planner.ros.messages.fields import (
+    NANOSECONDS,
+    nanoseconds_of,
+    numbers,
+    seconds_of,
+    stamp_of,
+)
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 # joint_trajectory_controller rejects a last point that is faster (float epsilon) [rad/s].
@@ -49,11 +54,7 @@ def joint_trajectory_to_msg(
     check_times(times)
     msg = JointTrajectory(joint_names=list(joint_names))
     msg.header.frame_id = frame
-    stamp = msg.header.stamp
-    # Nanoseconds since 1970 as one number would be 256 ns apart: a kink of 0.2 rad/s^2 at 1 kHz.
-    seconds = math.floor(begin)
-    more, stamp.nanosec = divmod(round((begin - seconds) * NANOSECONDS), NANOSECONDS)
-    stamp.sec = seconds + more
+    msg.header.stamp.sec, msg.header.stamp.nanosec = divmod(stamp_of(begin), NANOSECONDS)
     positions = trajectory.positions.tolist()
     for time, q, v, a in zip(times, positions, velocities, accelerations, strict=True):
         # Arrays are taken as they are; lists would be checked number by number.

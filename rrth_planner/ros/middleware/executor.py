@@ -260,5 +260,5 @@ def settle_interpreter() -> None:
     # Half a million objects of numba and ROS live as long as the node: the collector skips them.
     gc.collect()
     gc.freeze()
-    # Worker and executor share the interpreter; the default is 5 ms.
+    # Threads share the interpreter; the default is 5 ms.
     sys.setswitchinterval(SWITCH_INTERVAL)

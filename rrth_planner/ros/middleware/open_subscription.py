@@ -17,7 +17,7 @@ from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 from rrth_planner.model.errors import MessageError, one_line
 from rrth_planner.ros.messages.fields import Stamp
-from rrth_planner.ros.middleware.executor_barrier import taken
+from rrth_planner.ros.middleware.backlog import taken
 
 DEPTH = 50
 # So many messages are taken at once, so that other callbacks have their turn.

@@ -27,5 +27,7 @@ SUPERVISED = QoSProfile(**_LAST, durability=DurabilityPolicy.VOLATILE, **_LIVELI
 DEADLINE = 0.1
 RAY_CLEAR = QoSProfile(**_LAST, **_LIVELINESS, deadline=Duration(seconds=DEADLINE))
 
+# Answers, those to others included, until they are read.
+ANSWERED = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 # Requests may queue, and their responses: the default drops those beyond ten.
 SERVICE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)

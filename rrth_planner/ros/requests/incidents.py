@@ -14,7 +14,7 @@ from rrth_planner.io.incident import disagreement_incident, error_incident, Inci
 from rrth_planner.io.incident_file import write_incident
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.trajectory import Trajectory
-from rrth_planner.pipeline.planning_process import Planner
+from rrth_planner.pipeline.host import Host
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.ros.interface.parameters import PlannerParameters
 
@@ -75,7 +75,7 @@ def sentence_of(problem: BaseException) -> str:
     return f'planning failed unexpectedly: {type(cause).__name__}: {cause}'
 
 
-def incident_of_stop(stop: Stop, planner: Planner) -> Incident | None:
+async def incident_of_stop(stop: Stop, host: Host) -> Incident | None:
     """
     Return the record of a stop that is proven free but violates for the second checker, or None.
 
@@ -86,7 +86,9 @@ def incident_of_stop(stop: Stop, planner: Planner) -> Incident | None:
     parameters, trajectory = cast(PlannerParameters, stop.parameters), stop.trajectory
     arm, margin, ray = parameters.arm, parameters.margin, parameters.ray_guard_length
     library = parameters.second_checker
-    violation = planner.violation_seen(arm, stop.scene, trajectory, margin, ray, ray, 0.0, library)
+    violation = await host.violation_seen(
+        arm, stop.scene, trajectory, margin, ray, ray, 0.0, library
+    )
     if violation is None:
         return None
     question = PlanQuestion(

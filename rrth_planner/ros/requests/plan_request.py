@@ -2,27 +2,28 @@
 # SPDX-License-Identifier: Apache-2.0
 """One request: from the latest inputs to an outcome with a code, even after an error."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Awaitable, Callable
+from dataclasses import replace
 import math
 import secrets
 
 import numpy as np
 from rrth_planner.execution.command import ahead
 from rrth_planner.execution.executing_motion import ExecutingMotion
-from rrth_planner.io.incident import disagreement_incident, Incident
+from rrth_planner.execution.handover import Handover, LATE, LEADS
+from rrth_planner.io.incident import disagreement_incident
 from rrth_planner.model.arrays import Array, FARTHEST
 from rrth_planner.model.errors import RequestError, RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.status import ErrorCode
-from rrth_planner.model.trajectory import MotionState, sample, Trajectory
+from rrth_planner.model.trajectory import MotionState, sample
+from rrth_planner.pipeline.host import Host
 from rrth_planner.pipeline.motion_plan import MotionPlan
-from rrth_planner.pipeline.planning_process import Planner
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.ros.interface.inputs import ArmHasMoved, Inputs, InputSnapshot
+from rrth_planner.ros.interface.outcome import Outcome
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.error_codes import CODE_OF_STATUS
-from rrth_planner.ros.requests.handover import Handover, LATE, LEADS
 from rrth_planner.ros.requests.incidents import PlanError
 from rrth_planner.ros.requests.pace import (
     is_too_short,
@@ -33,64 +34,19 @@ from rrth_planner.ros.requests.pace import (
 )
 from rrth_planner.ros.requests.revalidation import Revalidation
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PlanOutcome:
-    """
-    How a request ended: code, sentence and, where known, the rest.
-
-    Parameters
-    ----------
-    incident : Incident or None
-        To be written to a file, which the answer names.
-
-    """
-
-    code: ErrorCode
-    sentence: str
-    plan: MotionPlan | None = None
-    snapshot: InputSnapshot | None = None
-    handover: Handover | None = None
-    incident: Incident | None = None
-
-    @property
-    def is_outdated(self) -> bool:
-        """Whether wearer or arm have moved meanwhile, or the arm still moves."""
-        if self.code is ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE:
-            return True
-        is_start = self.code in (
-            ErrorCode.START_STATE_IN_COLLISION,
-            ErrorCode.START_STATE_INVALID,
-        )
-        return is_start and self.handover is not None
-
-    @property
-    def is_in_the_way(self) -> bool:
-        """Whether the wearer is in the way, who may move on."""
-        return self.code in (
-            ErrorCode.START_STATE_IN_COLLISION,
-            ErrorCode.GOAL_IN_COLLISION,
-            ErrorCode.PLANNING_FAILED,
-        )
-
-    @property
-    def trajectory(self) -> Trajectory | None:
-        """The motion to publish; None unless the request succeeded."""
-        if self.plan is None or self.code is not ErrorCode.SUCCESS:
-            return None
-        return self.plan.trajectory
+# A request that waits for its handover looks so often whether it was cancelled [s].
+LONGEST_SLEEP = 0.05
 
 
-def plan_request(
+async def plan_request(
+    host: Host,
     inputs: Inputs,
     parameters: PlannerParameters,
-    clock: Callable[[], float],
-    planner: Planner,
     should_stop: Callable[[], bool],
-    publish: Callable[[PlanOutcome, Revalidation], bool],
+    publish: Callable[[Outcome, Revalidation], Awaitable[Outcome | None]],
     goal: PointingGoal | None = None,
     hold: Callable[[float], ExecutingMotion | None] = lambda until: None,
-) -> PlanOutcome:
+) -> Outcome:
     """
     Return the outcome of a request that begins now, once its motion is published.
 
@@ -99,15 +55,15 @@ def plan_request(
 
     Parameters
     ----------
+    host : Host
+        Where it runs.
     inputs : Inputs
         Copied at the beginning; checked again before the motion is published.
-    clock : callable
-        Returns the present time [s].
     should_stop : callable
-        Polled while planning; True cancels.
+        Polled while planning, by any thread; True cancels.
     publish : callable
-        Takes an outcome with a motion, and its revalidation; publishes the motion, or returns
-        False where it is too late. May raise RequestError.
+        Awaited; takes an outcome with a motion, and its revalidation; publishes the motion, and
+        returns the outcome, or None where it is too late. May raise RequestError.
     goal : PointingGoal, optional
         Of the request; without, the last target.
     hold : callable, optional
@@ -127,7 +83,7 @@ def plan_request(
         for lead in LEADS:
             question = plan = None
             require_not_cancelled(should_stop, 'the request was cancelled before its turn')
-            now = clock()
+            now = host.now()
             then = now + lead + ahead(delay)
             running = hold(then + LATE)
             snapshot = inputs.at(now, parameters, goal)
@@ -143,18 +99,18 @@ def plan_request(
                     # The controller holds what it was given last, from which the arm may sag.
                     q_start = running.trajectory.positions[-1]
             question = _question(snapshot, parameters, handover, q_start, inputs.body.age(now))
-            plan = planner.plan(question, should_stop)
+            plan = await host.plan(question, should_stop)
             for _ in range(MOST_SLOWER):
                 if not is_too_short(plan, snapshot.goal):
                     break
                 question = slower(question, plan, snapshot.goal)
-                plan = planner.plan(question, should_stop)
+                plan = await host.plan(question, should_stop)
             require_long_enough(plan, snapshot.goal)
             code = CODE_OF_STATUS[plan.status]
             if plan.disagreement is not None:
                 incident = disagreement_incident(question, plan.disagreement)
-                return PlanOutcome(code, plan.sentence, plan, snapshot, incident=incident)
-            outcome = PlanOutcome(code, plan.sentence, plan, snapshot, handover)
+                return Outcome(code, plan.sentence, plan, snapshot, incident=incident)
+            outcome = Outcome(code, plan.sentence, plan, snapshot, handover, parameters)
             if plan.trajectory is None or code is not ErrorCode.SUCCESS:
                 return outcome
             gap = float(np.abs(plan.trajectory.positions[0] - question.q_start).max())
@@ -164,22 +120,23 @@ def plan_request(
                     f'expected at most {parameters.start_tolerance:g} rad'
                 )
             if handover is not None:
-                if clock() > handover.time:
+                if host.now() > handover.time:
                     continue
-                handover.wait(clock, should_stop)
+                await _wait_for(handover, host, should_stop)
             revalidation = Revalidation(
-                inputs, clock, parameters, snapshot, plan, handover, running
+                inputs, host, parameters, snapshot, plan, handover, running
             )
             try:
                 require_not_cancelled(should_stop)
-                found = revalidation.disagreement(planner)
+                found = await revalidation.disagreement()
                 if found is not None:
                     incident = disagreement_incident(question, *found)
                     sentence = f'{incident.sentence}, seed {plan.seed}'
                     failed = replace(outcome, code=ErrorCode.FAILURE, sentence=sentence)
                     return replace(failed, incident=incident)
-                if publish(outcome, revalidation):
-                    return outcome
+                published = await publish(outcome, revalidation)
+                if published is not None:
+                    return published
             except ArmHasMoved:
                 if handover is not None or running is None or lead == LEADS[-1]:
                     raise
@@ -189,7 +146,7 @@ def plan_request(
             f'the arm moves, and no handover was planned and checked within {LEADS[-1]:g} s',
         )
     except RequestError as problem:
-        return PlanOutcome(problem.code, str(problem), plan)
+        return Outcome(problem.code, str(problem), plan)
     except Exception as problem:
         if question is None:
             raise
@@ -204,6 +161,17 @@ def require_not_cancelled(
     """Raise RequestError where a request was cancelled."""
     if should_stop():
         raise RequestError(ErrorCode.PREEMPTED, sentence)
+
+
+async def _wait_for(handover: Handover, host: Host, should_stop: Callable[[], bool]) -> None:
+    """Return when the motion is to be published, or as soon as it is cancelled."""
+    # A simulated clock may stand still.
+    end = host.steady() + 2 * LEADS[-1]
+    while host.steady() < end and not should_stop():
+        left = handover.time - handover.publish_ahead - host.now()
+        if left <= 0.0:
+            return
+        await host.sleep(min(LONGEST_SLEEP, left))
 
 
 def _handover(

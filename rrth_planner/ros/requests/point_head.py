@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The action point_head: a goal is a request, and ends once the arm has arrived or rests."""
 
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 import time
 from typing import Any
@@ -16,9 +17,10 @@ from rrth_planner.execution.joint_reading import JointReading
 from rrth_planner.io.settings import LOWEST_LIMIT
 from rrth_planner.model.arm import pointing_angle
 from rrth_planner.model.errors import MessageError
-from rrth_planner.model.goal import PacedGoal
+from rrth_planner.model.goal import PacedGoal, PointingGoal
 from rrth_planner.model.status import ErrorCode
 from rrth_planner.ros.interface.inputs import Inputs
+from rrth_planner.ros.interface.outcome import Outcome
 from rrth_planner.ros.interface.reporter import Reporter
 from rrth_planner.ros.interface.scene_monitor import SceneMonitor
 from rrth_planner.ros.messages.error_codes import code_of_rejection
@@ -68,11 +70,13 @@ class PointHeadServer:
         reporter: Reporter,
         monitor: ExecutionMonitor,
         queue: PlanQueue,
+        respond: Callable[[PointingGoal], Awaitable[Outcome]],
         answers: Answers,
     ) -> None:
         """Offer the action."""
         self._node, self._scene_monitor, self._inputs = node, scene_monitor, inputs
         self._reporter, self._monitor, self._queue = reporter, monitor, queue
+        self._respond = respond
         self._pursuits: list[_Pursuit] = []
         # Not the node's clock: simulated time may stand still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -119,13 +123,13 @@ class PointHeadServer:
                 self._reporter.reject(ErrorCode.PREEMPTED, CANCELLED)
                 handle.canceled()
                 return PointHead.Result()
-            response = await self._queue.respond(goal)
-            if response.is_solved:
+            outcome = await self._respond(goal)
+            if outcome.trajectory is not None:
                 pursuit.commanded = time.monotonic()
                 code, sentence = await pursuit.ended
                 self._reporter.revise(code, sentence)
             else:
-                code = response.code
+                code = outcome.code
             if code is ErrorCode.SUCCESS:
                 handle.succeed()
             elif handle.is_cancel_requested:

@@ -1,42 +1,37 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Requests one after the other, in a worker thread, while the node receives messages."""
+"""Requests one after the other, as coroutines in the node's own thread."""
 
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, replace
-from functools import partial
 import math
-import time
 import traceback
 from typing import cast
 
-from nav_msgs.msg import Path
-from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
-from rclpy.task import Future
 from rrth_planner.execution.command import ahead
+from rrth_planner.execution.coroutines import Wait
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.joint_reading import JointReading
 from rrth_planner.execution.remaining_motion import is_place_free
 from rrth_planner.execution.watch import Stop
-from rrth_planner.model.errors import RequestError
+from rrth_planner.io.incident import Incident
+from rrth_planner.model.errors import LONGEST_SENTENCE, one_line, RequestError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.status import ErrorCode
-from rrth_planner.model.trajectory import Trajectory
-from rrth_planner.pipeline.planning_process import Planner
+from rrth_planner.pipeline.host import RequestHost
 from rrth_planner.ros.interface.inputs import Inputs
+from rrth_planner.ros.interface.outcome import Outcome
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.interface.publishers import PlanPublishers
-from rrth_planner.ros.interface.reporter import PlanReport, Reporter
+from rrth_planner.ros.interface.reporter import Reporter
 from rrth_planner.ros.interface.separation_status import NO_PROMISE
 from rrth_planner.ros.messages.body import scene_of
 from rrth_planner.ros.messages.error_codes import answer, FINAL
-from rrth_planner.ros.middleware.executor_barrier import ExecutorBarrier, NodeIsBusyError
+from rrth_planner.ros.messages.fields import NANOSECONDS, stamp_of
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor
 from rrth_planner.ros.requests.incidents import incident_of, incident_of_stop, keep, sentence_of
-from rrth_planner.ros.requests.plan_request import plan_request, PlanOutcome, require_not_cancelled
+from rrth_planner.ros.requests.plan_request import plan_request, require_not_cancelled
 from rrth_planner.ros.requests.revalidation import Revalidation
 from trajectory_msgs.msg import JointTrajectory
 
@@ -54,38 +49,10 @@ RESUME_PERIOD = 0.05
 LONGEST_UNKNOWN = 2.0
 # More requests than these do not wait; that is logged at most this often [s].
 MOST_WAITING, WARNING_PERIOD = 64, 5.0
+# More than a code and its name take before a sentence.
+LONGEST_CODE = 100
 CANCELLED = (ErrorCode.PREEMPTED, 'the request was cancelled')
 OVERTAKEN = (ErrorCode.PREEMPTED, 'another request has come meanwhile')
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Response:
-    """
-    The response to a request.
-
-    Parameters
-    ----------
-    is_solved : bool
-        Whether a motion was published.
-    code, sentence
-        Of the answer.
-    tool_path : callable
-        Returns the tool's path; empty where no motion was published.
-    conclude : callable
-        Called after the answer is sent: shows and reports the motion.
-
-    """
-
-    is_solved: bool
-    code: ErrorCode
-    sentence: str
-    tool_path: Callable[[], Path]
-    conclude: Callable[[], None]
-
-    @property
-    def text(self) -> str:
-        """Code and sentence, as `error_codes.answer` writes them."""
-        return answer(self.code, self.sentence)
 
 
 class _Ticket:
@@ -117,13 +84,14 @@ class _Resumption:
     is_during_stop: bool
     is_first: bool = True
 
-    def is_due(self, joints: JointReading | None, rest_speed: float) -> bool:
+    def is_due(self, joints: JointReading | None, rest_speed: float, present: float) -> bool:
         """
         Return whether to try now: during the stop, or once a reading after it has the arm at rest.
 
-        At rest it is no faster than a speed [rad/s]. Also once the time to wait for that is up.
+        At rest it is no faster than a speed [rad/s]. Also once the time to wait for that is up, by
+        a time that never steps [s].
         """
-        if self.is_during_stop or time.monotonic() >= self.latest:
+        if self.is_during_stop or present >= self.latest:
             return True
         return (
             joints is not None
@@ -138,6 +106,8 @@ class PlanQueue:
 
     Parameters
     ----------
+    host : RequestHost
+        Runs the requests.
     reporter : Reporter
         Its parameters, as they are when a request's turn begins, are those of the plan.
     monitor : ExecutionMonitor
@@ -147,22 +117,24 @@ class PlanQueue:
 
     def __init__(
         self,
-        node: Node,
+        host: RequestHost,
         inputs: Inputs,
         reporter: Reporter,
         publishers: PlanPublishers,
         monitor: ExecutionMonitor,
-        planner: Planner,
     ) -> None:
         """Start with nothing to do."""
-        self._node, self._inputs, self._reporter = node, inputs, reporter
-        self._publishers, self._monitor, self._planner = publishers, monitor, planner
-        self._barrier = ExecutorBarrier(node)
-        self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix='planner')
+        self._host, self._inputs, self._reporter = host, inputs, reporter
+        self._publishers, self._monitor = publishers, monitor
         self._open: set[_Ticket] = set()
         self._resumption: _Resumption | None = None
+        # Over once the last turn that was taken has ended.
+        self._turn: Wait[None] = Wait()
+        self._turn.give(None)
+        # What is answered and not reported yet.
+        self._unreported: list[Outcome] = []
         # The newest motion that is not shown yet, and when one was last shown [s].
-        self._unseen: tuple[PlanOutcome, PlannerParameters] | None = None
+        self._unseen: Outcome | None = None
         self._shown = -SHORTEST_SHOW
         self._is_closed = False
         # So far, and how many of them are not answered yet.
@@ -171,63 +143,49 @@ class PlanQueue:
         self._pursued: int | None = None
         # The goal that was given up last after a stop, and why.
         self._given_up: tuple[PointingGoal | None, ErrorCode, str] = None, *CANCELLED
-        # Not the node's clock: simulated time may stand still.
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = node.create_timer(PERIOD, self._follow_up, clock=steady)
 
-    async def respond(self, goal: PointingGoal | None) -> Response:
-        """Return the response to a request for a goal, or for the last target, after its turn."""
-        begin = time.perf_counter()
+    async def respond(self, goal: PointingGoal | None) -> Outcome:
+        """Return the outcome of a request for a goal, or for the last target, after its turn."""
+        begin = self._host.steady()
         # What it finds is compared by the clock of its own time.
         self._monitor.check_clock()
+        self._n_requests += 1
+        ticket = _Ticket(goal, self._n_requests)
         if self._n_waiting >= MOST_WAITING:
             sentence = f'{MOST_WAITING} requests wait for their answers already: ask again later'
-            self._node.get_logger().warning(sentence, throttle_duration_sec=WARNING_PERIOD)
-            return Response(False, ErrorCode.PREEMPTED, sentence, Path, lambda: None)
-        self._n_requests += 1
-        future, ticket = Future(), _Ticket(goal, self._n_requests)
-
-        def work() -> None:
-            try:
-                self._work(goal, begin, ticket, future.set_result)
-            except BaseException as problem:
-                future.set_exception(problem)
-            executor = self._node.executor
-            if executor is not None:
-                executor.wake()
-
+            self._host.warning(sentence, WARNING_PERIOD)
+            return self._answered(Outcome(ErrorCode.PREEMPTED, sentence), ticket)
         self._open.add(ticket)
         self._n_waiting += 1
         try:
-            self._worker.submit(work)
-            response: Response = await future
-            executor = self._node.executor
-            if executor is not None:
-                # As a task of its own: the answer is sent before it runs.
-                executor.create_task(self.prepare, response.conclude)
-            return response
+            async with self._own_turn():
+                outcome = await self._work(ticket, begin)
+            return self._answered(outcome, ticket)
         finally:
             self._n_waiting -= 1
             self._open.discard(ticket)
 
-    def prepare(self, work: Callable[[], None]) -> None:
-        """Run something in the worker thread before the requests that follow."""
+    def _answered(self, outcome: Outcome, ticket: _Ticket) -> Outcome:
+        """Publish the answer of a request; return its outcome with the number."""
+        # A long sentence is cut before the number, which clients look for.
+        ending = f'; answer {ticket.request}'
+        begin = one_line(outcome.sentence, LONGEST_SENTENCE - len(ending) - LONGEST_CODE)
+        sentence = begin + ending
+        outcome = replace(outcome, sentence=sentence, number=ticket.request)
+        self._publishers.publish_answer(outcome.answer)
+        self._unreported.append(outcome)
+        return outcome
 
-        def prepared() -> None:
-            try:
-                work()
-            except Exception:
-                # The request that needs it will report the error.
-                self._node.get_logger().error(traceback.format_exc())
-
-        if not self._is_closed:
-            self._worker.submit(prepared)
+    def _conclude(self, outcome: Outcome) -> None:
+        """Report an outcome, and have its motion shown."""
+        self._reporter.conclude(outcome)
+        if outcome.trajectory is not None:
+            self._unseen = outcome
 
     def cancel(self) -> int:
         """Cancel the requests that have published no motion yet; return their number."""
         ended, self._open, self._resumption = self._open, set(), None
-        # A copy is made at one go, while the worker removes tickets.
-        for ticket in ended.copy():
+        for ticket in ended:
             ticket.is_cancelled = True
             if ticket.request == self._pursued:
                 self._given_up = ticket.goal, *CANCELLED
@@ -244,8 +202,7 @@ class PlanQueue:
 
     def pursues(self, goal: PointingGoal) -> bool:
         """Return whether a motion to this goal is planned, or will be after a stop."""
-        is_open = any(ticket.goal is goal for ticket in self._open.copy())
-        return is_open or self._monitor.has_stopped(goal)
+        return any(t.goal is goal for t in self._open) or self._monitor.has_stopped(goal)
 
     def why_given_up(self, goal: PointingGoal) -> tuple[ErrorCode, str] | None:
         """Return how the last try after a stop ended, where this goal was given up then."""
@@ -259,138 +216,112 @@ class PlanQueue:
         self._monitor.close()
         # Who waits hears of it, as far as that is possible.
         with suppress(Exception):
+            self._report()
             self._note_end()
-        self._worker.shutdown(wait=True, cancel_futures=True)
-        self._planner.close()
+        self._host.close()
 
-    def _work(
-        self,
-        goal: PointingGoal | None,
-        begin: float,
-        ticket: _Ticket,
-        settle: Callable[[Response], None],
-        patience: float | None = None,
-    ) -> bool:
-        """
-        Plan, publish and settle a request; called in the worker's thread.
-
-        The request is settled as soon as its motion is published, in the node's own thread.
-        patience: how long to plan again while the wearer moves [s]; None: `time_limit`. Return
-        whether it may have a motion a moment later.
-        """
-        parameters = self._parameters_for(ticket)
-
-        def settle_published(outcome: PlanOutcome, parameters: PlannerParameters) -> None:
-            sentence = f'{outcome.sentence}; request {ticket.request}'
-            if not self._publishers.has_listener():
-                sentence += f'; nobody is subscribed to {self._publishers.motion_topic}'
-            settle(self._response(replace(outcome, sentence=sentence), parameters, begin))
-
+    @asynccontextmanager
+    async def _own_turn(self) -> AsyncIterator[None]:
+        """Give a turn, once those that were taken before have ended."""
+        before, turn = self._turn, Wait[None]()
+        self._turn = turn
         try:
-            outcome = self._plan(goal, ticket, parameters, settle_published, patience)
-            if outcome.trajectory is not None:
-                return False
-            if ticket.is_cancelled and outcome.code is not ErrorCode.PREEMPTED:
+            await before
+            yield
+        finally:
+            turn.give(None)
+
+    async def _work(self, ticket: _Ticket, begin: float, patience: float | None = None) -> Outcome:
+        """
+        Plan for a ticket, whose request began at a time [s], and publish the motion.
+
+        patience: how long to plan again while the wearer moves [s]; None: `time_limit`.
+        """
+        parameters = await self._parameters_for(ticket)
+        try:
+            outcome = await self._plan(ticket, parameters, patience)
+            is_cancelled = outcome.trajectory is None and ticket.is_cancelled
+            if is_cancelled and outcome.code is not ErrorCode.PREEMPTED:
                 outcome = replace(outcome, code=CANCELLED[0], sentence=CANCELLED[1])
         except Exception as problem:
             # After any error the caller gets an answer, and the node continues.
-            self._node.get_logger().error(traceback.format_exc())
-            outcome = PlanOutcome(
+            self._host.error(traceback.format_exc())
+            outcome = Outcome(
                 ErrorCode.FAILURE, sentence_of(problem), incident=incident_of(problem)
             )
+        sentence = outcome.sentence
         if outcome.incident is not None:
-            noted, file = keep(outcome.incident, parameters.incident_folder)
-            outcome = replace(outcome, sentence=outcome.sentence + noted)
-            self._reporter.incident(file)
-        settle(self._response(outcome, parameters, begin))
-        return outcome.code not in FINAL
+            sentence += await self._keep(outcome.incident, parameters.incident_folder)
+        if outcome.trajectory is None:
+            return replace(outcome, sentence=sentence)
+        if not self._publishers.has_listener():
+            sentence += f'; nobody is subscribed to {self._publishers.motion_topic}'
+        if outcome.parameters is not None and outcome.parameters.stands_still:
+            sentence += f'; {NO_PROMISE}'
+        took = self._host.steady() - begin
+        return replace(outcome, sentence=sentence, response_time=took)
 
-    def _plan(
-        self,
-        goal: PointingGoal | None,
-        ticket: _Ticket,
-        parameters: PlannerParameters,
-        settle_published: Callable[[PlanOutcome, PlannerParameters], None],
-        patience: float | None,
-    ) -> PlanOutcome:
+    async def _plan(
+        self, ticket: _Ticket, parameters: PlannerParameters, patience: float | None
+    ) -> Outcome:
         """
         Return the outcome of a request, planned again while a wearer who moves is in its way.
 
         After a time [s], or `time_limit`, the last outcome stands.
         """
         longest = parameters.options.time_limit if patience is None else patience
-        monitor, end = self._monitor, time.monotonic() + longest
+        monitor, end = self._monitor, self._host.steady() + longest
         n_faults = monitor.n_faults
-        self._await_clear_ray(parameters, ticket)
+        await self._await_clear_ray(parameters, ticket)
         while True:
             n_stops = monitor.n_stops
 
-            def publish(
-                outcome: PlanOutcome, revalidation: Revalidation, n_stops: int = n_stops
-            ) -> bool:
+            async def publish(
+                outcome: Outcome, revalidation: Revalidation, n_stops: int = n_stops
+            ) -> Outcome | None:
                 assert outcome.trajectory is not None
-                parameters = revalidation.parameters
-                start = 0.0 if outcome.handover is None else outcome.handover.time
-                msg = self._publishers.motion(outcome.trajectory, parameters, start)
-
-                def publish_now() -> bool:
-                    if monitor.n_faults != n_faults:
-                        raise RequestError(
-                            ErrorCode.FAILURE,
-                            f'an error while the motion was planned: {monitor.stop_reason}',
-                        )
-                    is_published = self._publish(ticket, outcome, revalidation, n_stops, msg)
-                    if is_published:
-                        settle_published(outcome, parameters)
-                    return is_published
-
-                try:
-                    # In the node's own thread, once all received messages are processed.
-                    return self._barrier.call(publish_now)
-                except NodeIsBusyError:
-                    require_not_cancelled(lambda: ticket.is_cancelled)
+                # Its stamp is known once it is published.
+                msg = self._publishers.motion(outcome.trajectory, revalidation.parameters, 0.0)
+                await self._host.read()
+                # From here on nothing is awaited: no message comes in between.
+                if monitor.n_faults != n_faults:
                     raise RequestError(
-                        ErrorCode.SENSOR_INFO_STALE,
-                        'the node is busy: bodies received while the motion was planned are not '
-                        'processed yet',
-                    ) from None
+                        ErrorCode.FAILURE,
+                        f'an error while the motion was planned: {monitor.stop_reason}',
+                    )
+                return self._publish(ticket, outcome, revalidation, n_stops, msg)
 
-            outcome = plan_request(
+            outcome = await plan_request(
+                self._host,
                 self._inputs,
                 parameters,
-                self._now,
-                self._planner,
                 lambda: ticket.is_cancelled,
                 publish,
-                goal,
+                ticket.goal,
                 monitor.hold,
             )
             may_change = outcome.is_outdated or (
                 outcome.is_in_the_way and self._inputs.is_wearer_moving()
             )
-            if not may_change or ticket.is_cancelled or time.monotonic() >= end:
+            if not may_change or ticket.is_cancelled or self._host.steady() >= end:
                 return outcome
-            time.sleep(AGAIN)
-            parameters = self._parameters_for(ticket)
+            await self._host.sleep(AGAIN)
+            parameters = await self._parameters_for(ticket)
 
-    def _parameters_for(self, ticket: _Ticket) -> PlannerParameters:
-        """
-        Return the parameters of a plan, once it is known whether the body stands still.
-
-        Called in the worker's thread, which waits for that.
-        """
-        end = time.monotonic() + LONGEST_UNKNOWN
-        while not ticket.is_cancelled and time.monotonic() < end:
-            left = self._inputs.source.time_until_known(time.monotonic())
+    async def _parameters_for(self, ticket: _Ticket) -> PlannerParameters:
+        """Return the parameters of a plan, once it is known whether the body stands still."""
+        end = self._host.steady() + LONGEST_UNKNOWN
+        while not ticket.is_cancelled and self._host.steady() < end:
+            left = self._inputs.source.time_until_known(self._host.steady())
             if not self._reporter.parameters.stands_still or left <= 0.0:
                 break
-            time.sleep(min(left, AGAIN))
+            await self._host.sleep(min(left, AGAIN))
         return self._reporter.parameters
 
     def _require_same_source(self, parameters: PlannerParameters) -> None:
         """Raise RequestError where it is not known any more that the body stands still."""
         is_standing = self._reporter.parameters.stands_still
-        left = self._inputs.source.time_until_known(time.monotonic())
+        left = self._inputs.source.time_until_known(self._host.steady())
         if is_standing != parameters.stands_still or (is_standing and left > 0.0):
             raise RequestError(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
@@ -398,24 +329,24 @@ class PlanQueue:
                 'stands still, or a stream of them',
             )
 
-    def _await_clear_ray(self, parameters: PlannerParameters, ticket: _Ticket) -> None:
+    async def _await_clear_ray(self, parameters: PlannerParameters, ticket: _Ticket) -> None:
         """
         Let a wearer who moves take a hand out of the pointing ray of an arm at rest.
 
         Whatever the arm did, its ray would sweep over the hand first.
         """
-        end = time.monotonic() + min(RAY_PATIENCE, parameters.options.time_limit)
+        end = self._host.steady() + min(RAY_PATIENCE, parameters.options.time_limit)
         while (
             self._inputs.is_wearer_moving()
             and self._is_ray_crossed(parameters)
-            and time.monotonic() < end
+            and self._host.steady() < end
             and not ticket.is_cancelled
         ):
-            time.sleep(AGAIN)
+            await self._host.sleep(AGAIN)
 
     def _is_ray_crossed(self, parameters: PlannerParameters) -> bool:
         """Return whether the arm rests, clear of the wearer but for its pointing ray."""
-        now, arm = self._now(), parameters.arm
+        now, arm = self._host.now(), parameters.arm
         try:
             joints = self._inputs.joints_at(now, parameters.joint_timeout)
             scene = scene_of(self._inputs.body_at(now, parameters))
@@ -428,48 +359,18 @@ class PlanQueue:
         is_free = is_place_free(q, arm, scene, margin, length)
         return not is_free and is_place_free(q, arm, scene, margin, 0.0)
 
-    def _response(
-        self, outcome: PlanOutcome, parameters: PlannerParameters, begin: float
-    ) -> Response:
-        """Return the response to a request that began at a time, by `time.perf_counter`."""
-        code, sentence, plan = outcome.code, outcome.sentence, outcome.plan
-        trajectory, figures = outcome.trajectory, PlanReport()
-        if trajectory is not None and parameters.stands_still:
-            sentence = f'{sentence}; {NO_PROMISE}'
-        if plan is not None:
-            figures = replace(figures, seed=plan.seed, planning_time=plan.planning_time)
-        if plan is not None and plan.path is not None and trajectory is not None:
-            figures = replace(
-                figures,
-                response_time=time.perf_counter() - begin,
-                duration=trajectory.duration,
-                length=plan.path.length,
-                clearance=plan.clearance,
-            )
-
-        def tool_path() -> Path:
-            return Path() if trajectory is None else self._tool_path(trajectory, parameters)
-
-        def conclude() -> None:
-            self._reporter.conclude(code, sentence, figures)
-            if trajectory is not None:
-                self._unseen = outcome, parameters
-
-        is_solved = trajectory is not None and not self._is_closed
-        return Response(is_solved, code, sentence, tool_path, conclude)
-
     def _publish(
         self,
         ticket: _Ticket,
-        outcome: PlanOutcome,
+        outcome: Outcome,
         revalidation: Revalidation,
         n_stops: int,
         msg: JointTrajectory,
-    ) -> bool:
+    ) -> Outcome | None:
         """
-        Publish the motion of a request, and have it monitored; called in the node's own thread.
+        Publish the motion of a request, and have it monitored; return the outcome with its stamp.
 
-        Return False where it is too late; raise RequestError where it is no longer valid.
+        None where it is too late; raise RequestError where it is no longer valid.
         """
         monitor, parameters = self._monitor, revalidation.parameters
         require_not_cancelled(lambda: ticket.is_cancelled)
@@ -486,20 +387,24 @@ class PlanQueue:
             )
         revalidation.require_fit()
         if revalidation.is_late():
-            return False
+            return None
         trajectory, plan, snapshot = outcome.trajectory, outcome.plan, outcome.snapshot
         assert trajectory is not None and plan is not None and snapshot is not None
-        self._reporter.body_used(self._inputs.body.age(self._now()))
+        now = self._host.now()
+        self._reporter.body_used(self._inputs.body.age(now))
         # From here on the request cannot be cancelled.
         self._open.discard(ticket)
-        handover, start = outcome.handover, self._now() + ahead(parameters.controller_delay)
+        handover, start = outcome.handover, now + ahead(parameters.controller_delay)
+        planned = ExecutingMotion(
+            trajectory=trajectory,
+            start_time=start if handover is None else handover.time,
+            target_distance=plan.target_distance,
+            escape_time=plan.escape_time,
+        )
+        stamp = msg.header.stamp
+        stamp.sec, stamp.nanosec = divmod(stamp_of(planned.start_time), NANOSECONDS)
         monitor.begin(
-            ExecutingMotion(
-                trajectory=trajectory,
-                start_time=start if handover is None else handover.time,
-                target_distance=plan.target_distance,
-                escape_time=plan.escape_time,
-            ),
+            planned,
             snapshot.goal,
             parameters,
             lambda: self._publishers.publish_planned(msg),
@@ -508,15 +413,20 @@ class PlanQueue:
         )
         self._pursued, self._given_up = ticket.request, (None, *CANCELLED)
         self._reporter.pursued(ticket.request)
-        return True
+        # As a whole it is published with what leads to it.
+        whole = monitor.running if parameters.separation is None else None
+        published = planned if whole is None else whole
+        return replace(outcome, stamp=stamp_of(published.start_time))
 
-    def _follow_up(self) -> None:
-        """Show the newest motion; after a stop, check it a second time and plan again."""
+    def follow_up(self) -> None:
+        """Report and show what was planned; check stops a second time, and plan again."""
+        self._report()
         self._show_newest()
         if not self._monitor.executes_whole:
             self._publishers.withdraw_whole()
+        now, present = self._host.now(), self._host.steady()
         for stop in self._monitor.take_stops():
-            self.prepare(partial(self._check_stop, stop))
+            self._host.begin(self._check_stop(stop))
             if stop.goal is not None and not stop.is_replanned:
                 # Also what was to be tried again after an earlier stop.
                 self.withdraw(stop.goal)
@@ -528,9 +438,9 @@ class PlanQueue:
                     stop.goal,
                     stop.n_motions,
                     self._n_requests,
-                    self._now() + duration,
-                    time.monotonic() + duration + LONGEST_SETTLING,
-                    time.monotonic() + duration + self._reporter.parameters.patience,
+                    now + duration,
+                    present + duration + LONGEST_SETTLING,
+                    present + duration + self._reporter.parameters.patience,
                     is_during_stop=stop.scene is not None,
                 )
                 self._open.add(self._resumption.ticket)
@@ -539,11 +449,17 @@ class PlanQueue:
             self._give_up(resumption, *OVERTAKEN)
             self._discard_resumption()
         elif resumption is not None and resumption.is_due(
-            self._inputs.joints.value, self._reporter.parameters.rest_speed
+            self._inputs.joints.value, self._reporter.parameters.rest_speed, present
         ):
             self._resumption = None
-            self.prepare(partial(self._resume, resumption))
+            self._host.begin(self._resume(resumption))
         self._note_end()
+
+    def _report(self) -> None:
+        """Report the outcomes whose answers have left meanwhile."""
+        outcomes, self._unreported = self._unreported, []
+        for outcome in outcomes:
+            self._conclude(outcome)
 
     def _give_up(self, resumption: _Resumption, code: ErrorCode, sentence: str) -> None:
         """Keep why the goal of a stopped motion is given up, unless another motion has begun."""
@@ -574,56 +490,60 @@ class PlanQueue:
             self._open.discard(self._resumption.ticket)
             self._resumption = None
 
-    def _resume(self, resumption: _Resumption) -> None:
-        """Plan again for the goal of a motion that was stopped; called in the worker's thread."""
+    async def _resume(self, resumption: _Resumption) -> None:
+        """Plan again for the goal of a motion that was stopped."""
+        async with self._own_turn():
+            await self._try_again(resumption)
+
+    async def _try_again(self, resumption: _Resumption) -> None:
         ticket = resumption.ticket
         if ticket.is_cancelled or self._is_overtaken(resumption):
             self._give_up(resumption, *(CANCELLED if ticket.is_cancelled else OVERTAKEN))
             self._open.discard(ticket)
             return
-        responses: list[Response] = []
-        begin, present = time.perf_counter(), time.monotonic()
+        begin = self._host.steady()
         n_requests = resumption.n_requests if not resumption.is_first else self._n_requests
-        may_pass = self._work(resumption.goal, begin, ticket, responses.append, 0.0)
-        response = responses[-1]
-        if resumption.is_during_stop and not response.is_solved:
+        outcome = await self._work(ticket, begin, 0.0)
+        is_solved = outcome.trajectory is not None
+        if resumption.is_during_stop and not is_solved:
             self._resumption = replace(resumption, is_during_stop=False)
             return
-        is_last = not may_pass or present >= resumption.end
-        if response.is_solved or resumption.is_first:
-            response.conclude()
+        is_last = outcome.code in FINAL or is_solved or begin >= resumption.end
+        if is_solved or resumption.is_first:
+            self._conclude(outcome)
         elif is_last:
-            self._reporter.revise(response.code, response.sentence)
-        if not response.is_solved and (resumption.is_first or is_last):
-            self._monitor.report_hold(response.text)
+            self._reporter.revise(outcome.code, outcome.sentence)
+        if not is_solved and (resumption.is_first or is_last):
+            self._monitor.report_hold(outcome.text)
         if not is_last:
             self._resumption = replace(
                 resumption,
                 n_requests=n_requests,
                 stopped=math.inf,
-                latest=present + RESUME_PERIOD,
+                latest=begin + RESUME_PERIOD,
                 is_first=False,
             )
         else:
-            if not response.is_solved:
-                self._give_up(resumption, response.code, response.sentence)
+            if not is_solved:
+                self._give_up(resumption, outcome.code, outcome.sentence)
             self._open.discard(ticket)
 
-    def _check_stop(self, stop: Stop) -> None:
+    async def _check_stop(self, stop: Stop) -> None:
         """Have the second checker check a stop that was published as proven free."""
-        incident = incident_of_stop(stop, self._planner)
+        incident = await incident_of_stop(stop, self._host)
         if incident is not None:
-            noted, file = keep(incident, cast(PlannerParameters, stop.parameters).incident_folder)
-            self._reporter.incident(file)
-            self._node.get_logger().error(f'fail-safe stop: {incident.sentence}{noted}')
+            parameters = cast(PlannerParameters, stop.parameters)
+            noted = await self._keep(incident, parameters.incident_folder)
+            self._host.error(f'fail-safe stop: {incident.sentence}{noted}')
 
-    def _tool_path(self, trajectory: Trajectory, parameters: PlannerParameters) -> Path:
-        """Return the tool's path; empty after an error, since the motion is published already."""
+    async def _keep(self, incident: Incident, folder: str) -> str:
+        """Have an incident written to a file; return what to add to the answer."""
         try:
-            return self._publishers.tool_path(trajectory, parameters)
-        except Exception:
-            self._node.get_logger().error(traceback.format_exc())
-            return Path()
+            noted, file = await self._host.help(keep, incident, folder)
+        except TimeoutError as problem:
+            noted, file = f'; no file was written to replay it: {problem}', None
+        self._reporter.incident(file)
+        return noted
 
     def _show_newest(self) -> None:
         """
@@ -631,22 +551,23 @@ class PlanQueue:
 
         That takes the interpreter for several milliseconds, which could delay a stop.
         """
-        present, unseen = time.monotonic(), self._unseen
+        present, unseen = self._host.steady(), self._unseen
         if (
             unseen is not None
             and present - self._shown >= SHORTEST_SHOW
             and self._publishers.is_view_subscribed()
         ):
             self._unseen, self._shown = None, present
-            self.prepare(partial(self._show, *unseen))
+            self._host.begin(self._show(unseen))
 
-    def _show(self, outcome: PlanOutcome, parameters: PlannerParameters) -> None:
+    async def _show(self, outcome: Outcome) -> None:
         """Publish what shows a motion."""
-        assert outcome.trajectory is not None and outcome.snapshot is not None
-        snapshot = outcome.snapshot
-        self._publishers.publish_view(
-            outcome.trajectory, parameters, snapshot.scene, snapshot.goal.target
+        trajectory, parameters, snapshot = outcome.trajectory, outcome.parameters, outcome.snapshot
+        assert trajectory is not None and parameters is not None and snapshot is not None
+        await self._host.help(
+            self._publishers.publish_view,
+            trajectory,
+            parameters,
+            snapshot.scene,
+            snapshot.goal.target,
         )
-
-    def _now(self) -> float:
-        return self._node.get_clock().now().nanoseconds * 1e-9

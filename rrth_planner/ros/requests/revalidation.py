@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Revalidation of a planned motion against the latest inputs, just before it is published."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +13,7 @@ from rrth_planner.execution.command import ahead
 from rrth_planner.execution.decide import MARGIN_LEFT
 from rrth_planner.execution.executing_motion import ExecutingMotion, FOLLOWS
 from rrth_planner.execution.expected_wearer import is_expected_free
+from rrth_planner.execution.handover import Handover, LEADS
 from rrth_planner.execution.remaining_motion import is_place_free
 from rrth_planner.execution.tracked_motion import OFF_COMMAND
 from rrth_planner.model.arm import reach_to
@@ -21,11 +21,10 @@ from rrth_planner.model.errors import RequestError
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.status import ErrorCode
 from rrth_planner.model.trajectory import Trajectory
+from rrth_planner.pipeline.host import Host
 from rrth_planner.pipeline.motion_plan import MotionPlan
-from rrth_planner.pipeline.planning_process import Planner
 from rrth_planner.ros.interface.inputs import ArmHasMoved, Inputs, InputSnapshot
 from rrth_planner.ros.interface.parameters import PlannerParameters
-from rrth_planner.ros.requests.handover import Handover, LEADS
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,8 +36,8 @@ class Revalidation:
     ----------
     inputs : Inputs
         The latest ones.
-    clock : callable
-        Returns the present time [s].
+    host : Host
+        Where the request runs.
     snapshot : InputSnapshot
         The inputs of the plan.
     plan : MotionPlan
@@ -51,26 +50,26 @@ class Revalidation:
     """
 
     inputs: Inputs
-    clock: Callable[[], float]
+    host: Host
     parameters: PlannerParameters
     snapshot: InputSnapshot
     plan: MotionPlan
     handover: Handover | None
     running: ExecutingMotion | None
 
-    def disagreement(self, planner: Planner) -> tuple[Disagreement, Scene] | None:
+    async def disagreement(self) -> tuple[Disagreement, Scene] | None:
         """
         Return the violation that only the second checker finds, and in which scene.
 
         It is asked only where the wearer has moved. Raise RequestError where an input is stale or
         rejected, or the motion is no longer valid for the moved wearer.
         """
-        present = self.inputs.at(self.clock(), self.parameters, self.snapshot.goal)
+        present = self.inputs.at(self.host.now(), self.parameters, self.snapshot.goal)
         if np.array_equal(present.scene.numbers, self.snapshot.scene.numbers):
             return None
         scene = self.require_fit()
         parameters = self.parameters
-        violation = planner.violation_seen(
+        violation = await self.host.violation_seen(
             parameters.arm,
             scene,
             self._motion,
@@ -86,7 +85,7 @@ class Revalidation:
 
     def is_late(self) -> bool:
         """Return whether it is too late to publish the motion."""
-        return self.handover is not None and self.clock() > self.handover.deadline
+        return self.handover is not None and self.host.now() > self.handover.deadline
 
     def require_fit(self) -> Scene:
         """
@@ -95,7 +94,7 @@ class Revalidation:
         Raise RequestError where it is not, or begins where he will be soon, or where the arm is
         not at the start of the motion.
         """
-        now = self.clock()
+        now = self.host.now()
         present = self.inputs.at(now, self.parameters, self.snapshot.goal)
         self._require_arm(present, now)
         if not np.array_equal(present.scene.numbers, self.snapshot.scene.numbers):

@@ -2,9 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The handover from a running motion to a new one: where it begins, and when to publish it."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-import time
 
 from rrth_planner.execution.command import ahead
 from rrth_planner.execution.executing_motion import ExecutingMotion, LONGEST_LEAD
@@ -18,8 +16,6 @@ LEADS = (0.05, LONGEST_LEAD)
 EARLY = 0.5
 # A motion may be published so late where the present motion is unknown [s].
 LATE = 0.02
-# Polling more often would take the interpreter from the monitor [s].
-LONGEST_SLEEP = 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,13 +74,3 @@ class Handover:
         # At rest after its end the state is that of the end.
         at, duration = self.start_state.time, self.running.trajectory.duration
         return at if at < duration else self.time - self.running.start_time
-
-    def wait(self, clock: Callable[[], float], should_stop: Callable[[], bool]) -> None:
-        """Return when the motion is to be published, or as soon as it is cancelled."""
-        # A simulated clock may stand still.
-        end = time.monotonic() + 2 * LEADS[-1]
-        while time.monotonic() < end and not should_stop():
-            left = self.time - self.publish_ahead - clock()
-            if left <= 0.0:
-                return
-            time.sleep(min(LONGEST_SLEEP, left))
