@@ -127,11 +127,13 @@ class FlightRecorder:
 
     def to_bytes(self) -> bytes:
         """Return a file's content; `read_flight` reads it."""
-        if not self._segments:
+        # Another thread may record meanwhile.
+        segments = tuple(self._segments)
+        if not segments:
             raise RecordError('flight recorder: empty, expected at least one event')
         buffer = io.BytesIO()
-        _Writer(buffer, self._number).dump(self._segments[0][1])
-        kept = [entry for *_, entries in tuple(self._segments) for entry in tuple(entries)]
+        _Writer(buffer, self._number).dump(segments[0][1])
+        kept = [entry for *_, entries in segments for entry in tuple(entries)]
         entries = [(self._event(one.event), int(one.fate), one.command) for one in kept]
         rules = [pickle.dumps(plain(one), protocol=5) for one in self._rules]
         return MAGIC + pickle.dumps((rules, buffer.getvalue(), entries), protocol=5)

@@ -99,6 +99,7 @@ class PlannerNode(Node):
             (GetPlan, '~/get_plan', self._on_get_plan),
             (Trigger, '~/cancel', self._on_cancel),
             (Trigger, '~/reset', self._on_reset),
+            (Trigger, '~/save', self._on_save),
         ):
             self.create_service(kind, name, callback, qos_profile=SERVICE, callback_group=group)
         self._serve_action(Answers(self))
@@ -236,6 +237,14 @@ class PlannerNode(Node):
         fault = self._monitor.reset()
         response.success = True
         response.message = answer(ErrorCode.SUCCESS, f'reset: {fault or "nothing"}')
+        return response
+
+    async def _on_save(self, _: Any, response: Trigger.Response) -> Trigger.Response:
+        try:
+            found = ErrorCode.SUCCESS, await self.host.future_of(self._queue.save())
+        except RrthError as problem:
+            found = ErrorCode.FAILURE, str(problem)
+        response.success, response.message = found[0] is ErrorCode.SUCCESS, answer(*found)
         return response
 
 

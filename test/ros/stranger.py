@@ -50,7 +50,12 @@ class Stranger:
         self.subscribe('/diagnostics', DiagnosticArray, 10)
         self.services = {
             name: self.node.create_client(kind, f'rrth_planner/{name}')
-            for name, kind in (('plan', Trigger), ('get_plan', GetPlan), ('cancel', Trigger))
+            for name, kind in (
+                ('plan', Trigger),
+                ('get_plan', GetPlan),
+                ('cancel', Trigger),
+                ('save', Trigger),
+            )
         }
 
     def subscribe(self, name, msg_type, profile):

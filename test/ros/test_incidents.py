@@ -99,7 +99,7 @@ def test_a_disagreement_is_answered_and_kept_to_be_replayed(
     with monkeypatch.context() as patch:
         patch.setattr(trajectory_validation, 'first_violation', lambda *_: VIOLATION)
         message = stranger.answer().message
-    (file,) = tmp_path.iterdir()
+    (file,) = tmp_path.glob('incident-*')
     assert message == f'{SENTENCE}, seed 5; to replay it: ./run exec replay {file}; answer 1'
     stranger.wait_until(lambda: stranger.value('last incident') == str(file))
     assert stranger.value('incidents') == '1'
@@ -134,7 +134,7 @@ def test_a_disagreement_is_answered_and_kept_to_be_replayed(
     stranger.publishers['joint_states'].publish(samples.joints())
     stranger.wait_until(lambda: not inputs_of(planner).joints.value.velocities.any())
     assert stranger.answer().success
-    assert len(list(tmp_path.iterdir())) == 1
+    assert len(list(tmp_path.glob('incident-*'))) == 1
 
 
 def test_a_stop_that_violates_for_the_second_checker_is_kept_to_be_replayed(
@@ -167,8 +167,8 @@ def test_a_stop_that_violates_for_the_second_checker_is_kept_to_be_replayed(
     # What agrees leaves nothing behind.
     check(None)
     check(VIOLATION)
-    stranger.wait_until(lambda: list(tmp_path.iterdir()))
-    (file,) = tmp_path.iterdir()
+    stranger.wait_until(lambda: list(tmp_path.glob('incident-*')))
+    (file,) = tmp_path.glob('incident-*')
     stranger.wait_until(lambda: stranger.value('last incident') == str(file))
     assert stranger.value('incidents') == '1'
     incident = read_incident(file)
@@ -201,7 +201,7 @@ def test_files_are_kept_among_the_logs_by_default(start, monkeypatch, tmp_path):
         patch.setenv('ROS_LOG_DIR', str(tmp_path))
         patch.setattr(trajectory_validation, 'first_violation', lambda *_: VIOLATION)
         message = stranger.answer().message
-    (file,) = (tmp_path / 'rrth_planner').iterdir()
+    (file,) = (tmp_path / 'rrth_planner').glob('incident-*')
     assert message.endswith(f'{file}; answer 1')
 
 
@@ -230,7 +230,7 @@ def test_an_error_after_the_plan_is_kept_with_the_motion(start, monkeypatch, tmp
     with monkeypatch.context() as patch:
         patch.setattr(planner._queue._publishers, 'publish_motion', fail)
         message = stranger.answer().message
-    (file,) = tmp_path.iterdir()
+    (file,) = tmp_path.glob('incident-*')
     assert message == (
         'FAILURE (99999): planning failed unexpectedly: OSError: no publisher; to replay it: '
         f'./run exec replay {file}; answer 1'
@@ -258,7 +258,7 @@ def test_an_error_before_anything_was_asked_leaves_no_file(start, monkeypatch, t
         patch.setattr(plan_request, '_question', fail)
         message = stranger.answer().message
     assert message == f'{UNEXPECTED}ValueError: of a test; answer 1'
-    assert not list(tmp_path.iterdir())
+    assert not list(tmp_path.glob('incident-*'))
     assert stranger.answer().success
 
 
@@ -381,3 +381,40 @@ def test_configurations_that_all_violate_are_reported_with_part_and_box(start):
     message = stranger.answer().message
     assert message.startswith('GOAL_IN_COLLISION (-12): all ')
     assert 'pointing ray and box "wall' in message
+
+
+@pytest.mark.parametrize('replayed', [replayed, replayed_elsewhere])
+def test_the_last_events_of_the_monitor_are_saved_and_decided_again(
+    start, tmp_path, capsys, replayed
+):
+    planner, stranger = start(incident_folder=str(tmp_path), seed=5)
+    say_all(planner, stranger)
+    assert stranger.answer().success
+    message = stranger.answer('save').message
+    (file,) = tmp_path.glob('flight-*.flight')
+    assert message == f'SUCCESS (1): {file}'
+    code, out = replayed(file, capsys)
+    assert code == 0
+    assert ' s  monitoring\n' in out
+    assert out.splitlines()[-1] == 'reproduced: every command is the same as recorded, to the bit'
+
+
+def test_a_fault_leaves_what_led_to_it(start, tmp_path, capsys):
+    planner, stranger = start(incident_folder=str(tmp_path), seed=5)
+    say_all(planner, stranger)
+    assert stranger.answer().success
+    planner.fail('an error of the test')
+    stranger.wait_until(lambda: list(tmp_path.glob('flight-*.flight')))
+    (file,) = tmp_path.glob('flight-*.flight')
+    code, out = replayed(file, capsys)
+    assert code == 0
+    assert 'stopping: an error of the test: fail-safe stop' in out
+
+
+def test_where_no_record_can_be_written_the_answer_says_why(start, tmp_path):
+    planner, stranger = start(incident_folder='/dev/null/of_the_test', seed=5)
+    say_all(planner, stranger)
+    answer = stranger.answer('save')
+    assert not answer.success
+    assert 'no flight record was written' in answer.message
+    assert stranger.answer().success

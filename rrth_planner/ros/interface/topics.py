@@ -114,6 +114,7 @@ INTERFACES = {
             'with `separation`: allows motions again after a FAULT, and with `resume: manual` '
             'lets a stopped one go on',
         ),
+        _served('~/save', TRIGGER, 'writes the last 30 s of the monitor to a file, by its name'),
         _published(
             'joint_trajectory',
             MOTION,

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Incidents of requests and stops: what is recorded, and where its file is kept."""
 
+from datetime import datetime, timezone
 from pathlib import Path
 import shlex
 import traceback
@@ -9,10 +10,11 @@ from typing import cast
 
 from rclpy.logging import get_logging_directory
 from rrth_planner.collision.violation import Disagreement
+from rrth_planner.execution.flight_recorder import FlightRecorder
 from rrth_planner.execution.watch import Stop
 from rrth_planner.io.incident import disagreement_incident, error_incident, Incident
-from rrth_planner.io.incident_file import write_incident
-from rrth_planner.model.errors import RrthError
+from rrth_planner.io.incident_file import write_incident, write_record
+from rrth_planner.model.errors import RecordError, RrthError
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.pipeline.host import Host
 from rrth_planner.pipeline.request import PlanQuestion
@@ -47,6 +49,15 @@ def keep(incident: Incident, folder: str) -> tuple[str, Path | None]:
         reason = ' '.join(f'{type(problem).__name__}: {problem}'.split())
         return f'; no file was written to replay it: {reason}', None
     return f'; to replay it: ./run exec replay {shlex.quote(str(path))}', path
+
+
+def keep_flight(flight: FlightRecorder, folder: str) -> Path:
+    """Write the last events of the monitor to a file; raise RecordError where that fails."""
+    time = datetime.now(timezone.utc).isoformat(timespec='microseconds')
+    try:
+        return write_record(flight.to_bytes(), incident_folder(folder), 'flight', time, '.flight')
+    except OSError as problem:
+        raise RecordError(f'no flight record was written: {problem}') from problem
 
 
 def incident_of(problem: BaseException) -> Incident | None:

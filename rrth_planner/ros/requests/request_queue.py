@@ -16,7 +16,7 @@ from rrth_planner.execution.joint_reading import JointReading
 from rrth_planner.execution.remaining_motion import is_place_free
 from rrth_planner.execution.watch import Stop
 from rrth_planner.io.incident import Incident
-from rrth_planner.model.errors import LONGEST_SENTENCE, one_line, RequestError
+from rrth_planner.model.errors import LONGEST_SENTENCE, one_line, RecordError, RequestError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.status import ErrorCode
 from rrth_planner.pipeline.host import RequestHost
@@ -30,7 +30,13 @@ from rrth_planner.ros.messages.body import scene_of
 from rrth_planner.ros.messages.error_codes import answer, FINAL
 from rrth_planner.ros.messages.fields import NANOSECONDS, stamp_of
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor
-from rrth_planner.ros.requests.incidents import incident_of, incident_of_stop, keep, sentence_of
+from rrth_planner.ros.requests.incidents import (
+    incident_of,
+    incident_of_stop,
+    keep,
+    keep_flight,
+    sentence_of,
+)
 from rrth_planner.ros.requests.plan_request import plan_request, require_not_cancelled
 from rrth_planner.ros.requests.revalidation import Revalidation
 from trajectory_msgs.msg import JointTrajectory
@@ -139,6 +145,8 @@ class PlanQueue:
         self._is_closed = False
         # So far, and how many of them are not answered yet.
         self._n_requests, self._n_waiting = 0, 0
+        # Of the monitor, when its events were last written for that.
+        self._n_faults = 0
         # The number of the request whose goal the arm pursues; None: of none.
         self._pursued: int | None = None
         # The goal that was given up last after a stop, and why.
@@ -422,6 +430,9 @@ class PlanQueue:
         """Report and show what was planned; check stops a second time, and plan again."""
         self._report()
         self._show_newest()
+        if self._monitor.n_faults != self._n_faults:
+            self._n_faults = self._monitor.n_faults
+            self._host.begin(self._save_fault())
         if not self._monitor.executes_whole:
             self._publishers.withdraw_whole()
         now, present = self._host.now(), self._host.steady()
@@ -536,6 +547,22 @@ class PlanQueue:
             noted = await self._keep(incident, parameters.incident_folder)
             self._host.error(f'fail-safe stop: {incident.sentence}{noted}')
 
+    async def save(self) -> str:
+        """Have the last events of the monitor written to a file; return its name."""
+        folder = self._reporter.parameters.incident_folder
+        try:
+            return str(await self._host.help(keep_flight, self._monitor.flight, folder))
+        except TimeoutError as problem:
+            raise RecordError(f'no flight record was written: {problem}') from problem
+
+    async def _save_fault(self) -> None:
+        """Have them written since something failed."""
+        try:
+            what = f'what led to it is in {await self.save()}'
+        except RecordError as problem:
+            what = str(problem)
+        self._host.error(f'{self._monitor.stop_reason}: {what}')
+
     async def _keep(self, incident: Incident, folder: str) -> str:
         """Have an incident written to a file; return what to add to the answer."""
         try:
@@ -543,6 +570,8 @@ class PlanQueue:
         except TimeoutError as problem:
             noted, file = f'; no file was written to replay it: {problem}', None
         self._reporter.incident(file)
+        with suppress(RecordError):
+            await self.save()
         return noted
 
     def _show_newest(self) -> None:
