@@ -8,7 +8,7 @@ take their time, a host that stands still, a middleware that fails, a controller
 """
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import math
 from typing import Protocol
@@ -36,6 +36,8 @@ from rrth_planner.simulation.trajectory_controller import (
 JOINT_PERIOD, CHECK_PERIOD = 0.01, 0.02
 # Where parts will be follows from two sights that are so far apart [s].
 STEADY, LATELY = 0.08, 0.25
+# A tracker's noise [m].
+MOVED = 0.01
 # Virtual time begins then [s]: stamps are positive.
 BEGIN = 1000.0
 
@@ -48,7 +50,7 @@ class Wearer(Protocol):
         """The parts of him."""
 
     def rows_at(self, time: float) -> Array:
-        """Return his boxes at a time [s], (m, 15)."""
+        """Return his boxes at a time [s], (m, 15); NaN: a part that is lost."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,6 +72,8 @@ class Wire:
         How long a decision takes: from, to [s].
     body_timeout, joint_timeout : float
         [s].
+    keep_lost : float
+        How long a lost part stays where it was before the arm stops [s].
 
     """
 
@@ -80,6 +84,7 @@ class Wire:
     deciding: tuple[float, float] = (0.0002, 0.0015)
     body_timeout: float = 0.2
     joint_timeout: float = 0.2
+    keep_lost: float = 2.0
 
 
 class World:
@@ -124,12 +129,14 @@ class World:
         self._reading: JointReading | None = None
         # The newest sight and the last ones, by when they came [s].
         self._scene, self._measured = Scene(()), -math.inf
+        # Of each part that has been seen: its box, and when it was measured last [s].
+        self._parts: dict[str, tuple[Box, float]] = {}
         self._sights: deque[tuple[float, Scene]] = deque(maxlen=64)
         self._last_arrival = -math.inf
         # What the controller was given last.
         self.arrived: Command | None = None
         # Bodies that came while the host stood still.
-        self._waiting: list[tuple[float, Scene, float]] = []
+        self._waiting: list[tuple[float, Sequence[Box], float]] = []
         timeline, rng = self.timeline, self.rng
         timeline.every(controller_period, self._cycle)
         timeline.every(JOINT_PERIOD, self._read, float(rng.uniform(0.0, JOINT_PERIOD)))
@@ -146,6 +153,8 @@ class World:
                 overdue = f'joint states are {joints:.3f} s old'
             elif age > self.wire.body_timeout:
                 overdue = f'the body is {age:.3f} s old'
+            elif lost := self.lost_since(now - self.wire.keep_lost):
+                overdue = f'the body has lost parts: {", ".join(lost)}'
         return Moment(
             now=now, steady=now, reading=self._reading, rules=self.rules, overdue=overdue
         )
@@ -155,7 +164,12 @@ class World:
         if self.monitor.watch.running is None:
             return None
         now = self.timeline.now
-        return Look(self._scene, self._expected(now), now - self._measured)
+        return Look(self._scene, self.expected(), now - self._measured)
+
+    def lost_since(self, time: float) -> tuple[str, ...]:
+        """Return the parts that are lost, and were measured before a time last [s]."""
+        latest = min(self._measured, time)
+        return tuple(name for name, (_, taken) in self._parts.items() if taken < latest)
 
     @property
     def is_still(self) -> bool:
@@ -168,6 +182,21 @@ class World:
         return self._scene
 
     @property
+    def measured(self) -> float:
+        """When he was seen last [s]."""
+        return self._measured
+
+    @property
+    def is_wearer_moving(self) -> bool:
+        """Whether a part of him has moved lately by more than a tracker's noise."""
+        since = self.timeline.now - LATELY
+        scenes = [scene for came, scene in self._sights if came >= since]
+        if len(scenes) < 2:
+            return False
+        now, before = scenes[-1].numbers, scenes[0].numbers
+        return now.shape != before.shape or bool(np.abs(now - before).max() > MOVED)
+
+    @property
     def reading(self) -> JointReading | None:
         """Where the arm was last."""
         return self._reading
@@ -176,7 +205,9 @@ class World:
         """Have the monitor take an event now."""
         self.monitor.take(event)
 
-    def _expected(self, now: float) -> Scene:
+    def expected(self) -> Scene:
+        """Return where moving parts of the wearer will be soon."""
+        now = self.timeline.now
         if not self._sights or now - self._sights[-1][0] > LATELY:
             return Scene(())
         came, present = self._sights[-1]
@@ -214,25 +245,34 @@ class World:
             return
         rows = self.wearer.rows_at(now)
         rows.setflags(write=False)
-        boxes = zip(self.wearer.names, rows, strict=True)
-        scene = Scene(tuple(Box.of_row(name, row) for name, row in boxes))
-        self.timeline.after(age, lambda: self._body_came(scene, now))
+        is_seen = np.isfinite(rows.sum(axis=1)).tolist()
+        boxes = [
+            Box.of_row(name, row)
+            for name, row, seen in zip(self.wearer.names, rows, is_seen, strict=True)
+            if seen
+        ]
+        if boxes:
+            self.timeline.after(age, lambda: self._body_came(boxes, now))
 
-    def _body_came(self, scene: Scene, measured: float) -> None:
-        self._waiting.append((self.timeline.now, scene, measured))
+    def _body_came(self, boxes: Sequence[Box], measured: float) -> None:
+        self._waiting.append((self.timeline.now, boxes, measured))
         if not self.is_still:
             self._take_waiting()
 
     def _take_waiting(self) -> None:
         """Have all bodies seen that came, and the newest one checked."""
         waiting, self._waiting = self._waiting, []
-        for k, (came, scene, measured) in enumerate(waiting):
+        for k, (came, boxes, measured) in enumerate(waiting):
             if measured <= self._measured:
                 # A newer one came before it.
                 continue
+            # A part that is lost stays where it was.
+            self._parts |= {box.name: (box, measured) for box in boxes}
+            scene = Scene(tuple(box for box, _ in self._parts.values()))
+            taken = np.array([time for _, time in self._parts.values()])
             self._scene, self._measured = scene, measured
             self._sights.append((self.timeline.now, scene))
-            sight = Sight(scene, np.full(len(scene.boxes), measured))
+            sight = Sight(scene, taken)
             look = self.look() if k == len(waiting) - 1 else None
             self.monitor.take(BodyCame(self.moment(), sight, look), self.timeline.now - came)
 
