@@ -31,7 +31,7 @@ from rrth_planner.simulation.trajectory_controller import (
 )
 from rrth_planner.timing.parameterization import parameterize
 
-from benchmarks.separation.contacts import distances_to
+from rrth_planner.rehearsal.contacts import distances_to
 from benchmarks.separation.setting import Case, FOLDED, MARGIN, RAY, separation_of, the_arm
 
 # How long everything may go wrong, and how long nothing does after that [s].

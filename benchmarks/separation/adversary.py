@@ -26,7 +26,7 @@ from rrth_planner.model.separation import speed_bound
 from rrth_planner.model.trajectory import positions_at, Trajectory
 from rrth_planner.pipeline.motion_plan import MotionPlan
 
-from benchmarks.separation.contacts import (
+from rrth_planner.rehearsal.contacts import (
     AT_REST,
     box_distances,
     classes_of,

@@ -36,7 +36,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from benchmarks.common.client import FRAME, LATCHED, ros_client
 from benchmarks.common.random_draws import random_target
 from benchmarks.common.real_time import run_in_real_time
-from benchmarks.separation.contacts import (
+from rrth_planner.rehearsal.contacts import (
     AT_REST,
     box_distances,
     classes_of,

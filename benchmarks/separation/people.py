@@ -31,7 +31,7 @@ from rrth_planner.wearer.body_boxes import body_boxes
 from rrth_planner.wearer.recorded_person import posture_at, RecordedPerson
 from tqdm import tqdm
 
-from benchmarks.separation.contacts import AT_REST, classes_of, distances_to, FAST, SLOW
+from rrth_planner.rehearsal.contacts import AT_REST, classes_of, distances_to, FAST, SLOW
 from benchmarks.separation.lockstep import (
     Controller,
     Eyes,

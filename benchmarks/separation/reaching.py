@@ -11,7 +11,7 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.rotation import rotation_matrix
 from rrth_planner.model.scene import Scene
 
-from benchmarks.separation.contacts import moving_bars
+from rrth_planner.rehearsal.contacts import moving_bars
 
 # The arm is looked at so far ahead, so often, at so many places of each bar.
 HORIZON, STEP, PLACES = 1.0, 5e-3, 9

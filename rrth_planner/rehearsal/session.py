@@ -195,10 +195,12 @@ class Session:
         rules: SessionRules,
         draw: Callable[[], Array],
         seed: int,
+        longest: float,
     ) -> None:
-        """Begin with no target."""
+        """Begin with no target; longest: a request is tried again until then [s]."""
         self.world, self._host, self._settings, self._rules = world, host, settings, rules
         self._draw, self._rng = draw, np.random.default_rng((seed, 2))
+        self._longest = longest
         self.pursuits: list[Pursuit] = []
         self.glances: list[Glance] = []
         self._pursuit: Pursuit | None = None
@@ -256,7 +258,7 @@ class Session:
             self.world.take(Reset(self.world.moment()))
         self._take_stops()
         end = pursuit.asked + self._rules.gives_up
-        answer = await self._requested(goal, pursuit, self._settings.options.time_limit)
+        answer = await self._requested(goal, pursuit, self._longest)
         while not answer.why:
             stop = await self._follow(end, replaced_at)
             if stop is None and host.now() >= replaced_at and monitor.watch.is_monitoring:

@@ -166,6 +166,14 @@ class World:
         now = self.timeline.now
         return Look(self._scene, self.expected(), now - self._measured)
 
+    def stand_still(self, until: float) -> None:
+        """Have the host stand still until a time [s]."""
+        self.stands_until = max(until, self.stands_until)
+
+    def reject(self, until: float) -> None:
+        """Have the controller reject what it is given until a time [s]."""
+        self.rejects_until = max(until, self.rejects_until)
+
     def lost_since(self, time: float) -> tuple[str, ...]:
         """Return the parts that are lost, and were measured before a time last [s]."""
         latest = min(self._measured, time)
@@ -180,6 +188,11 @@ class World:
     def scene(self) -> Scene:
         """The wearer as he was seen last."""
         return self._scene
+
+    @property
+    def taken(self) -> Array:
+        """When each part of him was seen last, (m,) [s]."""
+        return np.array([time for _, time in self._parts.values()])
 
     @property
     def measured(self) -> float:

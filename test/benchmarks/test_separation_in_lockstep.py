@@ -7,7 +7,7 @@ import pytest
 pytest.importorskip('tqdm')
 
 from benchmarks.separation.adversary import chain_of_hands, FAST, Trial, trials
-from benchmarks.separation.contacts import AT_REST, classes_of, distances_to, SLOW
+from rrth_planner.rehearsal.contacts import AT_REST, classes_of, distances_to, SLOW
 from benchmarks.separation.durations import chain_of_timed
 from benchmarks.separation.lockstep import Controller
 from benchmarks.separation.people import beside_person, items, speed_lines, Take

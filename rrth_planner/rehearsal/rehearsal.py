@@ -1,0 +1,200 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""A rehearsal: a scenario in virtual time, and what was seen of it."""
+
+from collections import Counter
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from rrth_planner.execution.commitments import ExecutionRules
+from rrth_planner.execution.watch import PlainRules
+from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.motion_capture_file import load_person
+from rrth_planner.io.settings import load_settings
+from rrth_planner.io.skeleton_file import load_skeleton
+from rrth_planner.io.wearer_file import load_body
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.separation import Separation, SeparationRules
+from rrth_planner.model.trajectory import MotionLimits
+from rrth_planner.pipeline.in_process_planner import InProcessPlanner
+from rrth_planner.rehearsal.rehearsed_wearer import (
+    Hidden,
+    InterceptingWearer,
+    LOOKS,
+    RecordedWearer,
+)
+from rrth_planner.rehearsal.scenario import Pair, Scenario
+from rrth_planner.rehearsal.session import Glance, IDLE, Pursuit, Session, SessionRules
+from rrth_planner.rehearsal.virtual_host import VirtualHost
+from rrth_planner.rehearsal.witness import Testimony, Witness
+from rrth_planner.rehearsal.world import BEGIN, Wire, World
+from rrth_planner.simulation.trajectory_controller import ControllerRules, ControllerVersion
+
+# A plan has as long as it needs: what a clock ends differs from run to run [s].
+UNLIMITED = 3600.0
+# Where the arm begins [rad].
+FOLDED = (0.0, -0.35, 0.5 * np.pi, 0.5 * np.pi)
+REST_SPEED = 0.01
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rehearsal:
+    """
+    What was seen of a scenario.
+
+    Parameters
+    ----------
+    digest : str
+        Two runs that have the same took the same decisions.
+    lost : Counter
+        How long targets took longer than at the full rate, by cause [s].
+
+    """
+
+    scenario: Scenario
+    digest: str
+    n_events: int
+    n_commands: int
+    n_stops: int
+    pursuits: tuple[Pursuit, ...]
+    glances: tuple[Glance, ...]
+    testimony: Testimony
+
+    @property
+    def lost(self) -> Counter[tuple[str, str]]:
+        """How long targets took longer than at the full rate, by what the arm did and why [s]."""
+        found: Counter[tuple[str, str]] = Counter()
+        for glance in self.glances:
+            if glance.doing != IDLE and glance.rate < 1.0:
+                found[glance.doing, glance.cause] += LOOKS * (1.0 - glance.rate)
+        return found
+
+
+def rehearsed(scenario: Scenario, is_drawn: bool = False) -> Rehearsal:
+    """
+    Return what is seen of a scenario in virtual time.
+
+    is_drawn: whether to measure how far the nearest part of the wearer is, for pictures.
+
+    Raises
+    ------
+    RrthError
+        What the scenario names is not there, or does not fit.
+
+    """
+    arm = load_arm()
+    settings = load_settings(arm.dof)
+    # The second checker is not asked: it finds faults of the planner, not of what is rehearsed.
+    planned = replace(settings, options=replace(settings.options, time_limit=UNLIMITED))
+    proof, execution, tracker = scenario.separation, scenario.controller, scenario.tracker
+    stop_limits = MotionLimits(
+        velocity=settings.limits.velocity,
+        acceleration=np.full(arm.dof, proof.stop_acceleration),
+        jerk=np.full(arm.dof, proof.stop_jerk),
+    )
+    separation = Separation(
+        arm=arm,
+        rules=SeparationRules(
+            contact_speed=proof.contact_speed, controller_delay=execution.delay
+        ),
+        margin=settings.margin,
+        limits=settings.limits,
+        stop_limits=stop_limits,
+    )
+    rules = PlainRules(
+        arm=arm,
+        margin=settings.margin,
+        ray_guard_length=settings.ray_guard_length,
+        stop_limits=stop_limits,
+        execution=ExecutionRules(separation, execution.delay, REST_SPEED, False),
+    )
+    person = _person(scenario)
+    world = World(
+        rules,
+        Hidden(person, [(loss.part, loss.begin, loss.end) for loss in tracker.loses]),
+        np.array(FOLDED),
+        scenario.seed,
+        Wire(
+            frame_period=1.0 / tracker.rate,
+            age=tracker.age,
+            loss=tracker.loss,
+            transport=execution.transport,
+            deciding=scenario.node.deciding,
+            keep_lost=tracker.keep_lost,
+        ),
+        controller=ControllerRules(version=ControllerVersion(execution.version)),
+        controller_period=execution.period,
+        lag=execution.lag,
+    )
+    witness = Witness(world, person, is_drawn)
+    if isinstance(person, InterceptingWearer):
+        hand = person
+
+        def look() -> None:
+            q = world.arm.measured_at(world.timeline.now).positions
+            hand.advance(world.timeline.now, arm, q)
+
+        world.timeline.every(LOOKS, look)
+    # Latencies of their own: what is asked for is the same whatever becomes of it.
+    latencies = np.random.default_rng((scenario.seed, 1))
+    host = VirtualHost(
+        world.timeline,
+        InProcessPlanner(),
+        lambda: float(latencies.uniform(*scenario.planner.latency)),
+        lambda: is_within(world.timeline.now - BEGIN, scenario.planner.dead),
+        settings.options.time_limit,
+    )
+    for begin, end in scenario.node.stands_still:
+        world.timeline.at(BEGIN + begin, lambda end=end: world.stand_still(BEGIN + end))
+    for begin, end in scenario.controller.rejects:
+        world.timeline.at(BEGIN + begin, lambda end=end: world.reject(BEGIN + end))
+    wanted, targets = scenario.requests, np.random.default_rng((scenario.seed, 3))
+
+    def draw() -> Array:
+        target: Array = targets.uniform(wanted.lowest, wanted.highest)
+        return target
+
+    session = Session(
+        world,
+        host,
+        planned,
+        SessionRules(pause=wanted.pause, gives_up=wanted.gives_up, replaced=wanted.replaced),
+        draw,
+        scenario.seed,
+        settings.options.time_limit,
+    )
+    world.timeline.run(BEGIN + scenario.seconds)
+    monitor = world.monitor
+    return Rehearsal(
+        scenario,
+        monitor.digest,
+        monitor.n_events,
+        monitor.n_commands,
+        monitor.n_stops,
+        tuple(session.pursuits),
+        tuple(session.glances),
+        witness.close(),
+    )
+
+
+def is_within(time: float, spans: tuple[Pair, ...]) -> bool:
+    """Return whether a time is within one of some spans [s]."""
+    return any(begin <= time < end for begin, end in spans)
+
+
+def _person(scenario: Scenario) -> RecordedWearer | InterceptingWearer:
+    recorded, hand = scenario.recorded, scenario.intercepting
+    if recorded is not None:
+        file = str(scenario.folder / recorded.file) if recorded.file else ''
+        return _recorded(file, recorded.skeleton, recorded.rate, recorded.begin)
+    assert hand is not None
+    return InterceptingWearer(load_body(), hand.hand, hand.speed, hand.waits, hand.pursues)
+
+
+# Several scenarios beside the same person make boxes of him once.
+@lru_cache(maxsize=4)
+def _recorded(file: str, skeleton: str, rate: float, begin: float) -> RecordedWearer:
+    person = load_person(Path(file) if file else None)
+    return RecordedWearer(person, load_skeleton(skeleton), rate, begin)

@@ -1,0 +1,215 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What was true of an arm beside a wearer in virtual time: contacts, by plain numpy.
+
+It knows nothing of the proof, and has the wearer where he really is, also where no tracker saw him.
+"""
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+from rrth_planner.collision.reference_checker import bar_box_contact, bar_radii, bars
+from rrth_planner.execution.decision import Command
+from rrth_planner.kernels.layout import ROTATION, SIZE
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.scene import Scene
+from rrth_planner.model.separation import speed_bound
+from rrth_planner.rehearsal.contacts import AT_REST, classes_of, distances_to, FAST, SLOW
+from rrth_planner.rehearsal.world import BEGIN, Wearer, World
+from rrth_planner.simulation.trajectory_controller import ControllerState
+
+# Instants that are judged at once, and those that wait for the wearer to have come so far.
+CHUNK, HELD_BACK = 2000, 20
+# Every so many cycles the ray, and the nearest part, are looked at.
+SPARSE = 4
+# A ray crosses a part in motion where a joint is faster than that [rad/s].
+MOVING = 0.01
+# Parts that are further away are not measured; for pictures [m].
+WITHIN, IN_PICTURES = 0.0, 0.6
+# The corners of a box, in halves of its size.
+_CORNERS = 0.5 * (np.indices((2, 2, 2)).reshape(3, 8).T * 2.0 - 1.0)
+
+
+@dataclass(slots=True)
+class Testimony:
+    """
+    What was seen.
+
+    Parameters
+    ----------
+    contacts : Counter
+        By class, and by whether the part had kept the speed that is assumed of it since the
+        wearer was seen whom the motion was proven with.
+    sentences : list of str
+        On contacts of the class FAST.
+    ray_seconds : float
+        How long the pointing ray of an arm in motion crossed a part [s].
+    moving_seconds : float
+        How long the arm was in motion [s].
+    nearest : list of (float, float)
+        When [s], how far the nearest part was [m]; for pictures.
+
+    """
+
+    contacts: Counter[tuple[str, bool]] = field(default_factory=Counter)
+    sentences: list[str] = field(default_factory=list)
+    ray_seconds: float = 0.0
+    moving_seconds: float = 0.0
+    nearest: list[tuple[float, float]] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Sight:
+    scene: Scene
+    taken: Array
+
+
+@dataclass(slots=True)
+class _Contact:
+    """The present contact of a bar with a box."""
+
+    last: int
+    word: str
+    is_kept: bool
+
+
+class Witness:
+    """
+    Sees each cycle of the controller, and judges.
+
+    Parameters
+    ----------
+    truth : Wearer
+        As he is; what a tracker sees of him is with the world.
+    is_drawn : bool
+        Whether to measure how far the nearest part is, too.
+
+    """
+
+    def __init__(self, world: World, truth: Wearer, is_drawn: bool = False) -> None:
+        """Begin with nothing seen."""
+        self.testimony = Testimony()
+        self._world, self._truth, self._is_drawn = world, truth, is_drawn
+        separation = world.rules.separation
+        self._contact_speed = 0.1 if separation is None else separation.rules.contact_speed
+        self._rules = None if separation is None else separation.rules
+        self._sights: dict[int, tuple[Command, _Sight]] = {}
+        self._active: tuple[_Sight | None, _Sight | None] = (None, None)
+        self._arrived: Command | None = None
+        self._seen: list[tuple[float, Array, Array, tuple[_Sight | None, _Sight | None]]] = []
+        self._n_judged = 0
+        self._open: dict[tuple[int, int], _Contact] = {}
+        world.on_setpoint, world.on_command = self._see, self._note
+
+    def close(self) -> Testimony:
+        """Judge what is left, and return all that was seen."""
+        self._judge(len(self._seen))
+        for key in tuple(self._open):
+            self._end(key)
+        return self.testimony
+
+    def _note(self, command: Command) -> None:
+        self._sights[id(command)] = command, _Sight(self._world.scene, self._world.taken)
+
+    def _see(self, time: float, state: ControllerState) -> None:
+        arrived = self._world.arrived
+        if arrived is not self._arrived and arrived is not None:
+            # Older ones have been overtaken.
+            sight = self._sights.pop(id(arrived))[1]
+            self._arrived, self._active = arrived, (sight, self._active[0])
+        # The arm is there a lag after the setpoint is due.
+        there = time + self._world.arm.lag_time
+        self._seen.append((there, state.positions, state.velocities, self._active))
+        if len(self._seen) >= CHUNK + HELD_BACK:
+            self._judge(CHUNK)
+
+    def _judge(self, n: int) -> None:
+        seen, self._seen = self._seen[:n], self._seen[n:]
+        if not seen:
+            return
+        arm, names, found = self._world.rules.arm, self._truth.names, self.testimony
+        q, v = np.array([one[1] for one in seen]), np.array([one[2] for one in seen])
+        rows = np.nan_to_num(np.array([self._truth.rows_at(one[0]) for one in seen]), nan=1e3)
+        speed = self._contact_speed
+        distances = distances_to(arm, q, v, names, rows, speed, WITHIN)
+        classes = classes_of(distances)
+        for i, bar, box in np.argwhere(classes != ''):
+            self._touch(
+                *(seen[i][0], seen[i][3], self._n_judged + int(i), int(bar), int(box)),
+                *(str(classes[i, bar, box]), float(distances.speeds[i, bar, box]), rows[i, box]),
+            )
+        self._n_judged += len(seen)
+        for key, contact in tuple(self._open.items()):
+            if contact.last < self._n_judged - 1:
+                self._end(key)
+        period = self._world.arm.controller.period
+        is_moving = (np.abs(v) > MOVING).any(axis=1)
+        found.moving_seconds += float(is_moving.sum()) * period
+        some = np.flatnonzero(is_moving)[::SPARSE]
+        if len(some):
+            length = self._world.rules.ray_guard_length
+            ray = bars(arm, q[some], length)[:, -1]
+            half = 0.5 * rows[some][:, :, SIZE:ROTATION] + bar_radii(arm)[-1]
+            turns = rows[some][:, :, ROTATION:].reshape(len(some), -1, 3, 3)
+            centers = rows[some][:, :, :SIZE]
+            crossed = bar_box_contact(ray[:, None], centers, turns, half).any(axis=1)
+            found.ray_seconds += float(crossed.sum()) * SPARSE * period
+        if self._is_drawn:
+            few = slice(None, None, SPARSE)
+            near = distances_to(arm, q[few], v[few], names, rows[few], speed, IN_PICTURES)
+            gaps = np.minimum(near.whole.min(axis=(1, 2)), IN_PICTURES)
+            times = [one[0] for one in seen[few]]
+            found.nearest += zip(times, gaps.tolist(), strict=True)
+
+    def _touch(
+        self,
+        time: float,
+        sights: tuple[_Sight | None, _Sight | None],
+        at: int,
+        bar: int,
+        box: int,
+        word: str,
+        speed: float,
+        row: Array,
+    ) -> None:
+        kept = any(self._has_kept(sight, box, row, time) for sight in sights if sight is not None)
+        contact = self._open.get((bar, box))
+        if contact is not None and contact.last < at - 1:
+            self._end((bar, box))
+            contact = None
+        if contact is None:
+            contact = self._open[bar, box] = _Contact(at, word, False)
+        contact.last = at
+        order = (FAST, SLOW, AT_REST)
+        if order.index(word) < order.index(contact.word):
+            contact.word, contact.is_kept = word, False
+        if word == contact.word:
+            contact.is_kept |= kept
+        if word == FAST and kept:
+            self.testimony.sentences.append(
+                f'{time - BEGIN:.3f} s: bar {bar} at {speed:.2f} m/s and '
+                f'"{self._truth.names[box]}", which kept its speed'
+            )
+
+    def _has_kept(self, sight: _Sight, box: int, row: Array, time: float) -> bool:
+        """Return whether a part has kept its speed since it was seen."""
+        name = self._truth.names[box]
+        known = [one.name for one in sight.scene.boxes]
+        if self._rules is None or name not in known:
+            return False
+        k = known.index(name)
+        way = np.linalg.norm(_corners(row) - _corners(sight.scene.boxes[k].numbers), axis=1).max()
+        longest = speed_bound(self._rules, name) * (time - float(sight.taken[k]))
+        return bool(way <= longest + self._rules.body_error)
+
+    def _end(self, key: tuple[int, int]) -> None:
+        contact = self._open.pop(key)
+        self.testimony.contacts[contact.word, contact.is_kept] += 1
+
+
+def _corners(row: Array) -> Array:
+    """Return the corners of a box, (8, 3) [m]."""
+    result: Array = row[:SIZE] + (_CORNERS * row[SIZE:ROTATION]) @ row[ROTATION:].reshape(3, 3).T
+    return result
