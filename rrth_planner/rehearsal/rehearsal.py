@@ -190,7 +190,9 @@ def _person(scenario: Scenario) -> RecordedWearer | InterceptingWearer:
         file = str(scenario.folder / recorded.file) if recorded.file else ''
         return _recorded(file, recorded.skeleton, recorded.rate, recorded.begin)
     assert hand is not None
-    return InterceptingWearer(load_body(), hand.hand, hand.speed, hand.waits, hand.pursues)
+    return InterceptingWearer(
+        *(load_body(), hand.hand, hand.home, hand.speed, hand.waits, hand.pursues)
+    )
 
 
 # Several scenarios beside the same person make boxes of him once.

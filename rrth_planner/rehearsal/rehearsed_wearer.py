@@ -9,7 +9,7 @@ import numpy as np
 from rrth_planner.model.arm import ArmModel, tool_pose
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import RecordError, SceneError
-from rrth_planner.model.scene import Scene
+from rrth_planner.model.scene import Box, Scene
 from rrth_planner.rehearsal.world import BEGIN
 from rrth_planner.wearer.body_boxes import body_boxes
 from rrth_planner.wearer.recorded_person import posture_at, RecordedPerson
@@ -20,6 +20,8 @@ from rrth_planner.wearer.skeleton import Skeleton
 INSTANT = 1 / 600
 # A hand that goes for the arm looks so often where that is [s].
 LOOKS = 0.02
+# How large it is [m].
+HAND = (0.1, 0.1, 0.2)
 
 
 class RecordedWearer:
@@ -88,10 +90,14 @@ class InterceptingWearer:
 
     Parameters
     ----------
+    scene : Scene
+        All of him but that hand.
     hand : str
-        Which of his boxes.
+        What it is called.
+    home : (float, float, float)
+        Where it rests [m].
     speed : float
-        Of that [m/s].
+        Its [m/s].
     waits, pursues : float
         How long it rests where it is at first, and how long it goes for the arm then, again and
         again [s].
@@ -99,14 +105,18 @@ class InterceptingWearer:
     """
 
     def __init__(
-        self, scene: Scene, hand: str, speed: float, waits: float, pursues: float
+        self,
+        scene: Scene,
+        hand: str,
+        home: tuple[float, float, float],
+        speed: float,
+        waits: float,
+        pursues: float,
     ) -> None:
         """Begin at rest."""
-        self.names = tuple(box.name for box in scene.boxes)
-        if hand not in self.names:
-            raise SceneError(f'hand: "{hand}", expected a box of the body, {self.names}')
-        self._rows, self._hand = scene.numbers.copy(), self.names.index(hand)
-        self._home = self._rows[self._hand, :3].copy()
+        whole = Scene((*scene.boxes, Box(hand, np.array(home), np.array(HAND), np.eye(3))))
+        self.names = tuple(box.name for box in whole.boxes)
+        self._rows, self._home = whole.numbers.copy(), np.array(home)
         self._speed, self._waits, self._pursues = speed, waits, pursues
         self._times, self._places = [BEGIN], [self._home]
 
@@ -128,11 +138,11 @@ class InterceptingWearer:
         rows = self._rows.copy()
         k = int(np.searchsorted(self._times, time))
         if k == 0 or k >= len(self._times):
-            rows[self._hand, :3] = self._places[min(k, len(self._places) - 1)]
+            rows[-1, :3] = self._places[min(k, len(self._places) - 1)]
             return rows
         begin, end = self._times[k - 1], self._times[k]
         share = (time - begin) / (end - begin)
-        rows[self._hand, :3] = (1.0 - share) * self._places[k - 1] + share * self._places[k]
+        rows[-1, :3] = (1.0 - share) * self._places[k - 1] + share * self._places[k]
         return rows
 
 

@@ -42,12 +42,14 @@ class Recorded:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Intercepting:
     """
-    Somebody who stands still but for one hand, which goes for the arm.
+    The wearer of `config/body.yaml`, with a hand that goes for the arm.
 
     Parameters
     ----------
     hand : str
-        A box of `config/body.yaml`.
+        What it is called.
+    home : (float, float, float)
+        Where it rests [m].
     speed : float
         [m/s].
     waits, pursues : float
@@ -56,6 +58,7 @@ class Intercepting:
     """
 
     hand: str = 'right hand'
+    home: tuple[float, float, float] = (0.42, -0.27, -0.14)
     speed: float = 1.5
     waits: float = 2.0
     pursues: float = 1.5
@@ -98,11 +101,7 @@ class Tracker:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answers:
-    """
-    The planner: how long its answers take, from, to [s], and when there are none, from, to [s].
-
-    settings: values of `config/planner.yaml` that differ, as `margin`.
-    """
+    """The planner: how long its answers take, from, to, and when there are none, from, to [s]."""
 
     latency: Pair = (0.003, 0.05)
     dead: tuple[Pair, ...] = ()
@@ -281,7 +280,7 @@ def _read(kind: Any, value: Any, name: str) -> Any:
         return tuple(_read(option, item, name) for option, item in pairs)
     if kind is float:
         found = number(value, name, '-', OptionsError)
-        if found < 0.0 and not name.endswith(('lowest', 'highest')):
+        if found < 0.0 and not name.endswith(('home', 'lowest', 'highest')):
             raise OptionsError(f'{name}: {found:g}, expected a number >= 0')
         return found
     if kind is int:

@@ -154,7 +154,7 @@ class Witness:
             half = 0.5 * rows[some][:, :, SIZE:ROTATION] + bar_radii(arm)[-1]
             turns = rows[some][:, :, ROTATION:].reshape(len(some), -1, 3, 3)
             centers = rows[some][:, :, :SIZE]
-            crossed = bar_box_contact(ray[:, None], centers, turns, half).any(axis=1)
+            crossed = bar_box_contact(ray[:, None], centers[:, :, None], turns, half).any(axis=1)
             found.ray_seconds += float(crossed.sum()) * SPARSE * period
         if self._is_drawn:
             few = slice(None, None, SPARSE)
