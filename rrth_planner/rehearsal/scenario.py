@@ -149,7 +149,7 @@ class Execution:
     """
 
     version: str = '4.42'
-    period: float = 0.005
+    period: float = 0.01
     delay: float = 0.02
     lag: float = 0.01
     transport: Pair = (0.001, 0.009)

@@ -8,6 +8,8 @@ It knows nothing of the proof, and has the wearer where he really is, also where
 
 from collections import Counter
 from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from rrth_planner.collision.reference_checker import bar_box_contact, bar_radii, bars
@@ -21,8 +23,8 @@ from rrth_planner.rehearsal.world import BEGIN, Wearer, World
 from rrth_planner.simulation.trajectory_controller import ControllerState
 
 # Instants that are judged at once, and those that wait for the wearer to have come so far.
-CHUNK, HELD_BACK = 2000, 20
-# Every so many cycles the ray, and the nearest part, are looked at.
+CHUNK, HELD_BACK = 1000, 20
+# Every so many half cycles the ray, and the nearest part, are looked at.
 SPARSE = 4
 # A ray crosses a part in motion where a joint is faster than that [rad/s].
 MOVING = 0.01
@@ -66,6 +68,18 @@ class _Sight:
     taken: Array
 
 
+_Sights = tuple[_Sight | None, _Sight | None]
+
+
+class _Instant(NamedTuple):
+    """The arm at a time [s], and the wearers whom what it executes was proven with."""
+
+    time: float
+    q: Array
+    v: Array
+    sights: _Sights
+
+
 @dataclass(slots=True)
 class _Contact:
     """The present contact of a bar with a box."""
@@ -96,9 +110,9 @@ class Witness:
         self._contact_speed = 0.1 if separation is None else separation.rules.contact_speed
         self._rules = None if separation is None else separation.rules
         self._sights: dict[int, tuple[Command, _Sight]] = {}
-        self._active: tuple[_Sight | None, _Sight | None] = (None, None)
+        self._active: _Sights = (None, None)
         self._arrived: Command | None = None
-        self._seen: list[tuple[float, Array, Array, tuple[_Sight | None, _Sight | None]]] = []
+        self._seen: list[_Instant] = []
         self._n_judged = 0
         self._open: dict[tuple[int, int], _Contact] = {}
         world.on_setpoint, world.on_command = self._see, self._note
@@ -121,17 +135,18 @@ class Witness:
             self._arrived, self._active = arrived, (sight, self._active[0])
         # The arm is there a lag after the setpoint is due.
         there = time + self._world.arm.lag_time
-        self._seen.append((there, state.positions, state.velocities, self._active))
+        self._seen.append(_Instant(there, state.positions, state.velocities, self._active))
         if len(self._seen) >= CHUNK + HELD_BACK:
             self._judge(CHUNK)
 
     def _judge(self, n: int) -> None:
-        seen, self._seen = self._seen[:n], self._seen[n:]
+        seen, self._seen = _with_middles(self._seen[:n]), self._seen[n:]
         if not seen:
             return
         arm, names, found = self._world.rules.arm, self._truth.names, self.testimony
         q, v = np.array([one[1] for one in seen]), np.array([one[2] for one in seen])
-        rows = np.nan_to_num(np.array([self._truth.rows_at(one[0]) for one in seen]), nan=1e3)
+        times = np.array([one[0] for one in seen])
+        rows = np.nan_to_num(np.array([self._truth.rows_at(time) for time in times]), nan=1e3)
         speed = self._contact_speed
         distances = distances_to(arm, q, v, names, rows, speed, WITHIN)
         classes = classes_of(distances)
@@ -144,7 +159,7 @@ class Witness:
         for key, contact in tuple(self._open.items()):
             if contact.last < self._n_judged - 1:
                 self._end(key)
-        period = self._world.arm.controller.period
+        period = self._world.arm.controller.period / 2
         is_moving = (np.abs(v) > MOVING).any(axis=1)
         found.moving_seconds += float(is_moving.sum()) * period
         some = np.flatnonzero(is_moving)[::SPARSE]
@@ -160,13 +175,12 @@ class Witness:
             few = slice(None, None, SPARSE)
             near = distances_to(arm, q[few], v[few], names, rows[few], speed, IN_PICTURES)
             gaps = np.minimum(near.whole.min(axis=(1, 2)), IN_PICTURES)
-            times = [one[0] for one in seen[few]]
-            found.nearest += zip(times, gaps.tolist(), strict=True)
+            found.nearest += zip(times[few].tolist(), gaps.tolist(), strict=True)
 
     def _touch(
         self,
         time: float,
-        sights: tuple[_Sight | None, _Sight | None],
+        sights: _Sights,
         at: int,
         bar: int,
         box: int,
@@ -207,6 +221,15 @@ class Witness:
     def _end(self, key: tuple[int, int]) -> None:
         contact = self._open.pop(key)
         self.testimony.contacts[contact.word, contact.is_kept] += 1
+
+
+def _with_middles(seen: list[_Instant]) -> list[_Instant]:
+    """Return instants, and one between each two: there the arm moves along the line."""
+    found = seen[:1]
+    for before, after in pairwise(seen):
+        middle = [0.5 * (one + other) for one, other in zip(before[:3], after[:3], strict=True)]
+        found += [_Instant(*middle, before.sights), after]
+    return found
 
 
 def _corners(row: Array) -> Array:
