@@ -47,6 +47,7 @@ COMMANDS = {
     'read_urdf': Command('import an arm from a URDF', 'cli.read_urdf'),
     'write_urdf': Command('write the arm as a URDF', 'cli.write_urdf'),
     'replay': Command('replay an incident', 'cli.replay'),
+    'rehearse': Command('rehearse a scenario in virtual time', 'cli.rehearse'),
     'reproduce': Command("regenerate the paper's comparison", 'cli.reproduce'),
     'planner_node': Command(
         'run the planner as a ROS node', 'ros.planner_node', (ROS,), 'ros', 'config/planner.yaml'

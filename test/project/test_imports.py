@@ -29,7 +29,7 @@ MAY = {
     'wearer': 'model',
     'io': 'model collision planning pipeline wearer',
     'simulation': 'model wearer io',
-    'rehearsal': 'model collision timing execution pipeline wearer io simulation',
+    'rehearsal': 'kernels model collision timing execution pipeline wearer io simulation',
     'visualization': 'model collision planning execution pipeline wearer io',
     'ros': 'kernels model collision planning timing execution pipeline wearer io simulation',
     'reproduction': 'kernels model collision planning io visualization',
@@ -93,7 +93,7 @@ LATE = {
         f'rrth_planner.cli.{name}'
         for name in (
             *('plan', 'plot', 'point_at', 'read_urdf', 'record', 'replay', 'reproduce', 'viewer'),
-            'simulate',
+            *('simulate', 'rehearse'),
             *('campaign', 'file_question', 'query_batch'),
         )
     ),
