@@ -20,7 +20,8 @@ ROOT = os.path.dirname(os.path.realpath(__file__))
 # What is beside the code, by folder.
 FILES = {
     'config': [
-        *('*.yaml', '*.xml', 'examples/*', 'maps/*.yaml', 'people/*', 'skeletons/*.yaml'),
+        *('*.yaml', '*.xml', 'examples/*', 'maps/*.yaml', 'people/*', 'scenarios/*.yaml'),
+        'skeletons/*.yaml',
     ],
     'msg_examples': ['*.yaml'],
     'rviz': ['*.rviz'],

@@ -96,9 +96,7 @@ def rehearsed(scenario: Scenario, is_drawn: bool = False) -> Rehearsal:
     )
     separation = Separation(
         arm=arm,
-        rules=SeparationRules(
-            contact_speed=proof.contact_speed, controller_delay=execution.delay
-        ),
+        rules=SeparationRules(contact_speed=proof.contact_speed, controller_delay=execution.delay),
         margin=settings.margin,
         limits=settings.limits,
         stop_limits=stop_limits,

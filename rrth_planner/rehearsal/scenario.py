@@ -271,9 +271,7 @@ def _read(kind: Any, value: Any, name: str) -> Any:
     if origin is tuple:
         items = sequence(value, name, OptionsError)
         if options[-1] is Ellipsis:
-            return tuple(
-                _read(options[0], item, f'{name} {k}') for k, item in enumerate(items, 1)
-            )
+            return tuple(_read(options[0], item, f'{name} {k}') for k, item in enumerate(items, 1))
         if len(items) != len(options):
             raise OptionsError(f'{name}: {shown(value)}, expected {len(options)} numbers')
         pairs = zip(options, items, strict=True)

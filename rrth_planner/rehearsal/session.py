@@ -525,9 +525,7 @@ class Session:
             raise RequestError(
                 ErrorCode.START_STATE_IN_COLLISION, 'the arm is too near to the wearer'
             )
-        whole = ExecutingMotion(
-            trajectory=motion, start_time=0.0, escape_time=plan.escape_time
-        )
+        whole = ExecutingMotion(trajectory=motion, start_time=0.0, escape_time=plan.escape_time)
         if not is_expected_free(
             whole, 0.0, rules.arm, world.expected(), margin=margin, ray_guard_length=length
         ):
@@ -551,7 +549,9 @@ class Session:
         place = reading.mean_positions(self.world.rules.rest_speed)
         moved = float(np.abs(place - motion.positions[0]).max())
         if not moved <= tolerance:
-            raise _outdated(f'the arm has moved by {moved:.4f} rad, expected {tolerance:g} at most')
+            raise _outdated(
+                f'the arm has moved by {moved:.4f} rad, expected {tolerance:g} at most'
+            )
 
 
 def _outdated(sentence: str) -> RequestError:

@@ -70,7 +70,7 @@ def rehearsal_figure(course: Course) -> Figure:
         state.axvspan(*span, color=colour, linewidth=0.0, label=label)
     state.set_yticks([])
     state.set_xlabel('time [s]; above, a target: green where the arm came to aim at it')
-    state.legend(loc='upper left', ncols=4, fontsize='small', frameon=False)
+    state.legend(loc='center left', ncols=4, fontsize='small', facecolor='white')
     return figure
 
 
