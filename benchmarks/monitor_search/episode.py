@@ -23,6 +23,7 @@ from rrth_planner.model.errors import RequestError, RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import sample, Trajectory
+from rrth_planner.rehearsal.contacts import distances_to
 from rrth_planner.rehearsal.world import BEGIN, Wire, World
 from rrth_planner.simulation.trajectory_controller import (
     ControllerRules,
@@ -31,7 +32,6 @@ from rrth_planner.simulation.trajectory_controller import (
 )
 from rrth_planner.timing.parameterization import parameterize
 
-from rrth_planner.rehearsal.contacts import distances_to
 from benchmarks.separation.setting import Case, FOLDED, MARGIN, RAY, separation_of, the_arm
 
 # How long everything may go wrong, and how long nothing does after that [s].

@@ -25,7 +25,6 @@ from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.separation import speed_bound
 from rrth_planner.model.trajectory import positions_at, Trajectory
 from rrth_planner.pipeline.motion_plan import MotionPlan
-
 from rrth_planner.rehearsal.contacts import (
     AT_REST,
     box_distances,
@@ -35,6 +34,7 @@ from rrth_planner.rehearsal.contacts import (
     SLOW,
     worst_class,
 )
+
 from benchmarks.separation.lockstep import (
     Controller,
     Eyes,

@@ -11,8 +11,8 @@ from matplotlib import pyplot as plt
 import numpy as np
 from rrth_planner.execution.commitment import path_state, permitted
 from rrth_planner.model.arrays import Array
-
 from rrth_planner.rehearsal.contacts import distances_to
+
 from benchmarks.separation.lockstep import instants, Timing
 from benchmarks.separation.people import Beside, parts_of, Session, Take
 from benchmarks.separation.setting import Case, the_arm

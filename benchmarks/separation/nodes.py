@@ -26,6 +26,15 @@ from rrth_planner.model.rotation import quaternion_xyzw
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.separation import speed_bound
 from rrth_planner.model.trajectory import sample, Trajectory
+from rrth_planner.rehearsal.contacts import (
+    AT_REST,
+    box_distances,
+    classes_of,
+    distances_to,
+    FAST,
+    SLOW,
+    worst_class,
+)
 from rrth_planner.ros.messages.fields import seconds_of
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg
 from rrth_planner.ros.middleware.child_process import ChildProcess
@@ -36,15 +45,6 @@ from visualization_msgs.msg import Marker, MarkerArray
 from benchmarks.common.client import FRAME, LATCHED, ros_client
 from benchmarks.common.random_draws import random_target
 from benchmarks.common.real_time import run_in_real_time
-from rrth_planner.rehearsal.contacts import (
-    AT_REST,
-    box_distances,
-    classes_of,
-    distances_to,
-    FAST,
-    SLOW,
-    worst_class,
-)
 from benchmarks.separation.reaching import EARLIEST, FASTEST, interception, Reaching
 from benchmarks.separation.setting import Case, separation_of, STOPS, the_arm
 from benchmarks.soak.client import SoakClient

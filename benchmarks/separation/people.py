@@ -27,11 +27,11 @@ from rrth_planner.model.errors import SceneError
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.separation import speed_bound
 from rrth_planner.pipeline.motion_plan import MotionPlan
+from rrth_planner.rehearsal.contacts import AT_REST, classes_of, distances_to, FAST, SLOW
 from rrth_planner.wearer.body_boxes import body_boxes
 from rrth_planner.wearer.recorded_person import posture_at, RecordedPerson
 from tqdm import tqdm
 
-from rrth_planner.rehearsal.contacts import AT_REST, classes_of, distances_to, FAST, SLOW
 from benchmarks.separation.lockstep import (
     Controller,
     Eyes,

@@ -10,7 +10,6 @@ from rrth_planner.model.arm import ArmModel, bars_of
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.rotation import rotation_matrix
 from rrth_planner.model.scene import Scene
-
 from rrth_planner.rehearsal.contacts import moving_bars
 
 # The arm is looked at so far ahead, so often, at so many places of each bar.

@@ -58,7 +58,7 @@ def _rehearse(options: argparse.Namespace) -> int:
 
 
 def _file(given: str) -> Path:
-    """Return the file of a scenario that is given by its path, or by the name of a packaged one."""
+    """Return the file of a scenario, which is given by its path or by the name of one."""
     if Path(given).exists() or Path(given).name != given or Path(given).suffix:
         return Path(given)
     try:

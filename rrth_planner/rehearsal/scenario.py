@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is rehearsed, as a file says it: a wearer, his tracker, planner, controller and requests."""
+"""What is rehearsed, as a file says it: a wearer, tracker, planner, controller, requests."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields

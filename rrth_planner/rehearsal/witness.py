@@ -3,7 +3,7 @@
 """
 What was true of an arm beside a wearer in virtual time: contacts, by plain numpy.
 
-It knows nothing of the proof, and has the wearer where he really is, also where no tracker saw him.
+It knows nothing of the proof, and has the wearer where he is, also where no tracker sees him.
 """
 
 from collections import Counter

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The figure of a rehearsal: how near the wearer was, at which rate the arm moved, and its state."""
+"""The figure of a rehearsal: how near the wearer was, the rate of the arm, and its state."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -7,7 +7,6 @@ import pytest
 pytest.importorskip('tqdm')
 
 from benchmarks.separation.adversary import chain_of_hands, FAST, Trial, trials
-from rrth_planner.rehearsal.contacts import AT_REST, classes_of, distances_to, SLOW
 from benchmarks.separation.durations import chain_of_timed
 from benchmarks.separation.lockstep import Controller
 from benchmarks.separation.people import beside_person, items, speed_lines, Take
@@ -18,6 +17,7 @@ import numpy as np
 from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import Trajectory
+from rrth_planner.rehearsal.contacts import AT_REST, classes_of, distances_to, SLOW
 from worlds import table_1_arm
 
 STRICT = 'at the speeds assumed, strict'

@@ -8,9 +8,9 @@ from pathlib import Path
 from rrth_planner.cli.program import command_parser
 
 DESCRIPTION = """\
-Rehearse a scenario in virtual time, without ROS: a wearer, his tracker, the planner, the monitor of
-the node, a controller and an arm. Times are numbers: the same scenario has the same course on any
-machine, whatever else that does, and the same digest of all decisions of the monitor. Printed is
+Rehearse a scenario in virtual time, without ROS: a wearer, his tracker, the planner, the monitor
+of the node, a controller and an arm. Times are numbers: the same scenario has the same course,
+and the same digest of all decisions of the monitor, whatever else the machine does. Printed is
 what became of each target, where time was lost, and the contacts of the arm with the wearer as he
 really is.
 """
