@@ -77,6 +77,7 @@ executables = [
     'point_at = rrth_planner.cli.point_at:main',
     'read_urdf = rrth_planner.cli.read_urdf:main',
     'record = rrth_planner.cli.record:main',
+    'rehearse = rrth_planner.cli.rehearse:main',
     'replay = rrth_planner.cli.replay:main',
     'reproduce = rrth_planner.cli.reproduce:main',
     'viewer = rrth_planner.cli.viewer:main',

@@ -74,7 +74,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(', '.join(f'{n} {what}' for what, n in whole.outcomes.most_common()))
     print('\n| time lost [s] | share [%] | the arm | for |\n| --- | --- | --- | --- |')
     total = sum(whole.lost.values())
-    for (doing, cause), seconds in whole.lost.most_common(MOST_CAUSES):
+    lost = sorted(whole.lost.items(), key=lambda item: -item[1])
+    for (doing, cause), seconds in lost[:MOST_CAUSES]:
         print(f'| {seconds:.0f} | {100.0 * seconds / total:.1f} | {doing} | {cause or "–"} |')
     print(*whole.sentences, sep='\n')
     digest = hashlib.sha256(''.join(whole.digests).encode()).hexdigest()

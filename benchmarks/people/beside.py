@@ -40,7 +40,7 @@ class Row:
     ray: float = 0.0
     moving: float = 0.0
     contacts: Counter[tuple[str, bool]] = field(default_factory=Counter)
-    lost: Counter[tuple[str, str]] = field(default_factory=Counter)
+    lost: dict[tuple[str, str], float] = field(default_factory=dict)
     outcomes: Counter[str] = field(default_factory=Counter)
     sentences: list[str] = field(default_factory=list)
     digests: list[str] = field(default_factory=list)
@@ -51,7 +51,8 @@ class Row:
             setattr(self, name, getattr(self, name) + getattr(other, name))
         self.moving += other.moving
         self.contacts += other.contacts
-        self.lost += other.lost
+        for key, seconds in other.lost.items():
+            self.lost[key] = self.lost.get(key, 0.0) + seconds
         self.outcomes += other.outcomes
         self.sentences += other.sentences
         self.digests += other.digests

@@ -81,11 +81,12 @@ def lines_of(found: 'Rehearsal') -> list[str]:
             what = f'{one.took:8.2f}  {one.slowest:10.2f}  {one.n_plans:5}  {one.n_stops:5}'
             why = '' if one.outcome == 'aimed' else f': {one.sentence}'
             lines.append(f'  {one.asked - BEGIN:9.2f}  {what}  {one.outcome}{why}')
-    lost = [
+    lost = sorted(found.lost.items(), key=lambda item: -item[1])
+    causes = [
         f'  {seconds:6.2f} s  {doing}{f", {cause}" if cause else ""}'
-        for (doing, cause), seconds in found.lost.most_common(MOST_CAUSES)
+        for (doing, cause), seconds in lost[:MOST_CAUSES]
     ]
-    lines += ['', 'time lost, by what the arm did, and for what:', *lost]
+    lines += ['', 'time lost, by what the arm did, and for what:', *causes]
     lines += ['', 'contacts of the arm with the wearer as he really is:']
     for word in ('faster', 'slower', 'at rest'):
         kept, broken = seen.contacts[word, True], seen.contacts[word, False]

@@ -97,7 +97,8 @@ def distances_to(
                 is_nearer = least < fast[some, b, k]
                 speeds[some, b, k] = np.where(is_nearer, pace, speeds[some, b, k])
                 fast[some, b, k] = np.where(is_nearer, least, fast[some, b, k])
-    return Distances(whole, fast, speeds, (np.abs(v) < REST).all(axis=1))
+    is_at_rest: NDArray[np.bool_] = np.all(np.abs(v) < REST, axis=1)
+    return Distances(whole, fast, speeds, is_at_rest)
 
 
 def moving_bars(arm: ArmModel, q: Array, v: Array) -> tuple[Array, Array]:

@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A rehearsal: a scenario in virtual time, and what was seen of it."""
 
-from collections import Counter
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -48,8 +47,6 @@ class Rehearsal:
     ----------
     digest : str
         Two runs that have the same took the same decisions.
-    lost : Counter
-        How long targets took longer than at the full rate, by cause [s].
 
     """
 
@@ -63,12 +60,13 @@ class Rehearsal:
     testimony: Testimony
 
     @property
-    def lost(self) -> Counter[tuple[str, str]]:
+    def lost(self) -> dict[tuple[str, str], float]:
         """How long targets took longer than at the full rate, by what the arm did and why [s]."""
-        found: Counter[tuple[str, str]] = Counter()
+        found: dict[tuple[str, str], float] = {}
         for glance in self.glances:
             if glance.doing != IDLE and glance.rate < 1.0:
-                found[glance.doing, glance.cause] += LOOKS * (1.0 - glance.rate)
+                key = glance.doing, glance.cause
+                found[key] = found.get(key, 0.0) + LOOKS * (1.0 - glance.rate)
         return found
 
 
@@ -145,9 +143,9 @@ def rehearsed(scenario: Scenario, is_drawn: bool = False) -> Rehearsal:
         settings.options.time_limit,
     )
     for begin, end in scenario.node.stands_still:
-        world.timeline.at(BEGIN + begin, lambda end=end: world.stand_still(BEGIN + end))
-    for begin, end in scenario.controller.rejects:
-        world.timeline.at(BEGIN + begin, lambda end=end: world.reject(BEGIN + end))
+        world.timeline.at(BEGIN + begin, partial(world.stand_still, BEGIN + end))
+    for begin, end in execution.rejects:
+        world.timeline.at(BEGIN + begin, partial(world.reject, BEGIN + end))
     wanted, targets = scenario.requests, np.random.default_rng((scenario.seed, 3))
 
     def draw() -> Array:

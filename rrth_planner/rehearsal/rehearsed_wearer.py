@@ -167,7 +167,7 @@ class Hidden:
         for name, _, _ in losses:
             if name not in self.names:
                 raise SceneError(f'loses: "{name}", expected one of {", ".join(self.names)}')
-        self._losses = [(self.names.index(name), *span) for name, *span in losses]
+        self._losses = [(self.names.index(name), begin, end) for name, begin, end in losses]
 
     def rows_at(self, time: float) -> Array:
         """Return his boxes at a time [s], (m, 15); NaN: a part that is lost."""

@@ -227,8 +227,13 @@ def _with_middles(seen: list[_Instant]) -> list[_Instant]:
     """Return instants, and one between each two: there the arm moves along the line."""
     found = seen[:1]
     for before, after in pairwise(seen):
-        middle = [0.5 * (one + other) for one, other in zip(before[:3], after[:3], strict=True)]
-        found += [_Instant(*middle, before.sights), after]
+        middle = _Instant(
+            0.5 * (before.time + after.time),
+            0.5 * (before.q + after.q),
+            0.5 * (before.v + after.v),
+            before.sights,
+        )
+        found += [middle, after]
     return found
 
 
