@@ -68,10 +68,11 @@ class LaggingArm:
         The command of `lag_time` before; no accelerations (NaN).
         """
         then = time - self.lag_time
-        times = [due for due, _ in self._setpoints]
-        k = int(np.clip(np.searchsorted(times, then, side='right'), 1, len(times))) - 1
-        q, v = self._setpoints[k][1]
-        if k + 1 < len(times) and then > times[k]:
-            share = (then - times[k]) / (times[k + 1] - times[k])
-            q, v = (1.0 - share) * self._setpoints[k][1] + share * self._setpoints[k + 1][1]
+        setpoints, k = self._setpoints, len(self._setpoints) - 1
+        while k and setpoints[k][0] > then:
+            k -= 1
+        due, (q, v) = setpoints[k]
+        if k + 1 < len(setpoints) and then > due:
+            share = (then - due) / (setpoints[k + 1][0] - due)
+            q, v = (1.0 - share) * setpoints[k][1] + share * setpoints[k + 1][1]
         return ControllerState(positions=q, velocities=v, accelerations=np.full_like(q, np.nan))
