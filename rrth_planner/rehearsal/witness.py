@@ -151,7 +151,7 @@ class Witness:
         distances = distances_to(arm, q, v, names, rows, speed, WITHIN)
         classes = classes_of(distances)
         for i, bar, box in np.argwhere(classes != ''):
-            self._touch(
+            self._meet(
                 *(seen[i][0], seen[i][3], self._n_judged + int(i), int(bar), int(box)),
                 *(str(classes[i, bar, box]), float(distances.speeds[i, bar, box]), rows[i, box]),
             )
@@ -177,7 +177,7 @@ class Witness:
             gaps = np.minimum(near.whole.min(axis=(1, 2)), IN_PICTURES)
             found.nearest += zip(times[few].tolist(), gaps.tolist(), strict=True)
 
-    def _touch(
+    def _meet(
         self,
         time: float,
         sights: _Sights,
