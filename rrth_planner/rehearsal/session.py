@@ -23,10 +23,10 @@ from rrth_planner.execution.executing_motion import (
     ExecutingMotion,
     FOLLOWS,
     LONGEST_LAG,
-    LONGEST_LEAD,
     predict_start_state,
 )
 from rrth_planner.execution.expected_wearer import is_expected_free
+from rrth_planner.execution.handover import Handover, LATE, LEADS
 from rrth_planner.execution.joint_reading import JointReading
 from rrth_planner.execution.remaining_motion import is_place_free
 from rrth_planner.execution.watch import MonitorState, Stop
@@ -37,17 +37,12 @@ from rrth_planner.model.errors import RequestError, RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.status import ErrorCode, PlanStatus
-from rrth_planner.model.trajectory import StartState, Trajectory
+from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.rehearsal.virtual_host import VirtualHost
 from rrth_planner.rehearsal.world import World
 
-# How far ahead a handover is planned for, beyond the delay of the controller; the second value,
-# where the first was too short [s]. It is published this share of that before it begins.
-LEADS, EARLY = (0.05, LONGEST_LEAD), 0.5
-# What is commanded does not change so long after a handover that is planned [s].
-LATE = 0.02
 # A request that the wearer was in the way of, and a stopped one, is tried again after [s].
 AGAIN, RESUME_AGAIN = 0.01, 0.05
 # A wearer whose hand is in the ray of an arm at rest has so long to take it out [s].
@@ -162,14 +157,6 @@ class _Answer:
     why: str
     sentence: str
     may_pass: bool
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Handover:
-    time: float
-    lead: float
-    start: StartState
-    running: ExecutingMotion
 
 
 class Session:
@@ -387,7 +374,7 @@ class Session:
             q_start = reading.mean_positions(world.rules.rest_speed)
             if self._moves(running, then - now):
                 handover = self._handover(running, then, lead)
-                q_start = handover.start.state.positions
+                q_start = handover.start_state.state.positions
             else:
                 world.take(Hold(world.moment(), math.inf))
                 if running is not None:
@@ -397,30 +384,27 @@ class Session:
             if plan.trajectory is None or plan.status is not PlanStatus.SOLVED:
                 is_in_the_way = plan.status in IN_THE_WAY and self._is_wearer_moving()
                 return _Answer(plan.status.value, plan.sentence, is_in_the_way)
-            begin, joins = 0.0, math.inf
             if handover is not None:
-                deadline = handover.time - ahead(delay)
-                if host.now() > handover.time:
+                if host.now() > handover.deadline:
                     continue
-                early = deadline - EARLY * lead - host.now()
+                early = handover.time - handover.publish_ahead - host.now()
                 if early > 0.0:
                     await host.sleep(early)
-                if host.now() > deadline:
-                    continue
-                begin, joins = handover.time, handover.time - handover.running.start_time
             self._require_fit(goal, plan, scene, handover, running)
             if world.monitor.watch.n_stops != n_stops:
                 raise RequestError(
                     ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
                     'the arm was stopped while its motion was planned',
                 )
+            soon = host.now() + ahead(delay)
             motion = ExecutingMotion(
                 trajectory=plan.trajectory,
-                start_time=begin or host.now() + ahead(delay),
+                start_time=soon if handover is None else handover.time,
                 target_distance=plan.target_distance,
                 escape_time=plan.escape_time,
             )
-            before = None if handover is None else handover.running
+            joins = math.inf if handover is None else handover.joins
+            before = None if handover is None else handover.before
             world.monitor.begin(Begin(world.moment(), motion, goal, world.rules, joins, before))
             return _Answer('', plan.sentence, False)
         raise RequestError(
@@ -454,7 +438,7 @@ class Session:
             return True
         return running is not None and running.will_move(now, span)
 
-    def _handover(self, running: ExecutingMotion | None, time: float, lead: float) -> _Handover:
+    def _handover(self, running: ExecutingMotion | None, time: float, lead: float) -> Handover:
         """Return the handover from a moving arm at about a time [s]."""
         world, reading = self.world, self.world.reading
         assert reading is not None
@@ -474,10 +458,10 @@ class Session:
         )
         if start.time < running.trajectory.duration:
             time = running.start_time + start.time
-        return _Handover(time, lead, start, running)
+        return Handover(time, lead, start, running, world.rules.controller_delay, True)
 
     def _question(
-        self, goal: PointingGoal, scene: Scene, q_start: Array, handover: _Handover | None
+        self, goal: PointingGoal, scene: Scene, q_start: Array, handover: Handover | None
     ) -> PlanQuestion:
         settings, separation = self._settings, self.world.rules.separation
         return PlanQuestion(
@@ -490,7 +474,7 @@ class Session:
             margin=settings.margin,
             ray_guard_length=settings.ray_guard_length,
             seed=int(self._rng.integers(2**31)),
-            moving=None if handover is None else handover.start,
+            moving=None if handover is None else handover.start_state,
             escape_depth=settings.escape_depth,
             reserve=settings.reserve,
             second_checker=settings.second_checker,
@@ -504,7 +488,7 @@ class Session:
         goal: PointingGoal,
         plan: MotionPlan,
         planned_beside: Scene,
-        handover: _Handover | None,
+        handover: Handover | None,
         running: ExecutingMotion | None,
     ) -> None:
         """Raise RequestError where a motion does not fit the arm and the wearer any more."""
@@ -535,11 +519,12 @@ class Session:
         self,
         reading: JointReading,
         motion: Trajectory,
-        handover: _Handover | None,
+        handover: Handover | None,
         running: ExecutingMotion | None,
     ) -> None:
         delay, tolerance = self.world.rules.controller_delay, self._rules.start_tolerance
         if handover is not None:
+            assert handover.running is not None
             aside = handover.running.deviation(reading.positions, reading.taken, delay)
             if not aside <= FOLLOWS:
                 raise _outdated(f'the arm is {aside:.4f} rad from what it was commanded')
