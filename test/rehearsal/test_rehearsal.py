@@ -4,6 +4,8 @@
 
 from dataclasses import replace
 import os
+from pathlib import Path
+import re
 import subprocess
 import sys
 
@@ -22,7 +24,7 @@ from rrth_planner.model.separation import Separation, SeparationRules
 from rrth_planner.rehearsal.contacts import FAST
 from rrth_planner.rehearsal.rehearsal import rehearsed
 from rrth_planner.rehearsal.rehearsed_wearer import Hidden, InterceptingWearer
-from rrth_planner.rehearsal.scenario import load_scenario
+from rrth_planner.rehearsal.scenario import load_scenario, Recorded, Scenario
 from rrth_planner.rehearsal.session import REACHED
 from rrth_planner.rehearsal.timeline import Timeline
 from rrth_planner.rehearsal.virtual_host import VirtualHost
@@ -190,6 +192,14 @@ def test_a_bad_scenario_is_rejected_in_a_sentence(text, sentence, tmp_path):
         load_scenario(file)
     assert sentence in str(caught.value)
     assert str(file) in str(caught.value)
+
+
+def test_the_page_says_the_values_that_a_scenario_does_not_give(tmp_path):
+    page = Path(__file__).parents[2] / 'docs' / 'rehearsal.md'
+    block = re.search(r'```yaml\n(.*?)```', page.read_text(encoding='utf-8'), re.DOTALL)
+    file = tmp_path / 'scenario.yaml'
+    file.write_text(block[1], encoding='utf-8')
+    assert load_scenario(file) == Scenario(recorded=Recorded(), folder=tmp_path)
 
 
 def test_the_command_prints_what_became_of_each_target_and_draws_it(tmp_path, capsys):
