@@ -31,6 +31,8 @@ CHAOS, CALM = 15.0, 6.0
 PAUSE = (0.03, 0.5)
 # A handover is planned from what is commanded then, so much later [s].
 HANDOVER = 0.045
+# A hand of another stays where it came in for so long [s].
+STAYS = 1.0
 GOAL = PointingGoal(np.array([1.5, 0.1, 0.3]))
 
 
@@ -60,10 +62,11 @@ class Episode:
             doubled=float(rng.choice([0.0, 0.1])),
             transport=(0.0005, delay - lag - 0.0005),
             deciding=(0.0002, float(rng.choice([0.0015, 0.006]))),
+            hesitating=float(rng.choice([0.0, 0.02])),
         )
         self._person = Person(rng, self._aim)
-        # When the second hand is seen for the first time [s].
-        self._seen_from = BEGIN + float(rng.uniform(2.0, CHAOS - 2.0))
+        # When hands of others are seen for the first time [s].
+        self._seen_from = BEGIN + rng.uniform(1.0, CHAOS - 2.0, len(self._person.others))
         version = ControllerVersion(str(rng.choice(['4.20', '4.42', '6.9'])))
         controller = ControllerRules(version=version)
         self.world = World(
@@ -86,8 +89,7 @@ class Episode:
         world.timeline.every(world.arm.controller.period, self._move_hands)
         world.timeline.run(BEGIN + CHAOS)
         self._is_calm = True
-        for hand in self._person.hands:
-            hand.leave(world.timeline.now)
+        self._person.hand.leave(world.timeline.now)
         world.hidden = frozenset()
         world.stands_until = world.fails_until = world.blind_until = -math.inf
         world.rejects_until = -math.inf
@@ -154,15 +156,15 @@ class Episode:
         self.world.hidden -= {'hand'}
 
     def _move_hands(self) -> None:
-        now, (hand, other) = self.world.timeline.now, self._person.hands
-        if self._is_calm:
-            return
-        hand.go_on(now)
-        if now >= self._seen_from:
-            self.world.hidden -= {'other hand'}
-            # The first frame shows it where it was.
-            if now >= self._seen_from + 0.1:
-                other.go_on(now)
+        world, person = self.world, self._person
+        now = world.timeline.now
+        if not self._is_calm:
+            person.hand.go_on(now)
+        others = zip(person.names[2:], person.others, self._seen_from, strict=True)
+        for name, hand, since in others:
+            if now >= since and name in world.hidden:
+                world.hidden -= {name}
+                hand.leave(now + STAYS)
 
     def _aim(self, flight: float) -> Array:
         """Return some place of the arm after a time [s], as it is planned now, (3,) [m]."""

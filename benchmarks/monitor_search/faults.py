@@ -100,7 +100,7 @@ def _delay_ignored() -> Patches:
 
 
 def _join_unchecked() -> Patches:
-    """Begin motions wherever the one that they continue is, and lead them in with no part of it."""
+    """Begin motions wherever the one before them is, and lead them in with no part of it."""
 
     def lead_in(before: Trajectory, begin: float, end: float) -> Trajectory:
         return part_of(before, *(min(max(end + 0.02, 0.0), before.duration),) * 2)

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 import math
 
 import numpy as np
+from rrth_planner.execution.commitments import is_separate
 from rrth_planner.execution.decision import Command
 from rrth_planner.execution.watch import MonitorState
-from rrth_planner.model.arrays import Array
 from rrth_planner.model.trajectory import positions_at
 from rrth_planner.rehearsal.world import World
 from rrth_planner.simulation.trajectory_controller import ControllerState
@@ -23,14 +23,16 @@ from benchmarks.monitor_search.wearer import Person
 from benchmarks.separation.contacts import distances_to
 from benchmarks.separation.setting import the_arm
 
-# A message continues the one before it where its first setpoint is as near to that as this; it may
-# be due 7 ms after both part, at 400 rad/s^3 [rad, rad/s].
-APART, APART_SPEED = 1e-4, 0.012
+# A message continues the one before it: its first setpoint may be due so long after both part [s],
+# by no more than the greatest jerk makes of that; and rounding [rad, rad/s].
+PARTED, APART, APART_SPEED = 8e-3, 3e-6, 3e-4
 # A rejected message leaves the controller on another curve than what comes later continues: for
 # so long its steps are not judged [s].
 REJECTED = 2.0
 # A stop that is due comes within so long, not counting standstills and failures [s].
 PROMPT = 0.06
+# So many bodies may leave the whole rest of a motion unproven before it is stopped.
+UNPROVEN = 3
 # An arm that misses a stop is given it again within so long [s], where it is further off the stop
 # than this [rad], and faster than this [rad/s].
 AGAIN, OFF_STOP, MOVES = 0.4, 0.06, 0.1
@@ -87,7 +89,8 @@ class Judge:
         self.is_faulty = False
         self.is_beginning = False
         self._due: Due | None = None
-        self._n_pending = self._n_missed = 0
+        self._n_pending = self._n_missed = self._n_unproven = 0
+        self._judged = -math.inf
         self._last: tuple[Command, float] | None = None
         # When parts were measured at the latest, by the frames, and by what the monitor knows [s].
         self._frames: dict[str, float] = {}
@@ -133,9 +136,10 @@ class Judge:
             return
         apart = float(np.abs(setpoint.positions - former.positions).max())
         faster = float(np.abs(setpoint.velocities - former.velocities).max())
-        if apart > APART:
-            self.blame(f'a setpoint jumps, {apart:.4f} rad')
-        elif faster > APART_SPEED:
+        jerk = float(self._world.rules.stop_limits.jerk.max())
+        if apart > APART + jerk * PARTED**3 / 6:
+            self.blame(f'a setpoint jumps, {apart:.2e} rad')
+        elif faster > APART_SPEED + jerk * PARTED**2 / 2:
             self.blame(f'a setpoint jumps in speed, {faster:.4f} rad/s')
 
     def _see(self, time: float, state: ControllerState) -> None:
@@ -147,6 +151,7 @@ class Judge:
         is_working = not world.is_still and world.timeline.now >= world.fails_until
         self._judge_stops(is_working)
         self._judge_memory()
+        self._judge_proof(is_working)
         if is_working:
             self._judge_missed(state)
 
@@ -193,6 +198,23 @@ class Judge:
                 self.blame(f'{box.name} is taken to be newer than it was measured')
             self._known[box.name] = max(known, float(measured))
 
+    def _judge_proof(self, is_working: bool) -> None:
+        """Judge whether the whole rest of a motion is given up where it is not proven any more."""
+        world = self._world
+        now, watch = world.timeline.now, world.monitor.watch
+        known, fresh = watch.commitments, max(self._frames.values(), default=-math.inf)
+        if not watch.is_monitoring or known.sent is None or not known.is_whole:
+            self._n_unproven = 0
+            return
+        if fresh == self._judged or not is_working:
+            return
+        # The rest is shorter, and the wearer no older, than when it was proven.
+        self._judged = fresh
+        is_proven = is_separate(known, known.sent.motion, now)
+        self._n_unproven = 0 if is_proven else self._n_unproven + 1
+        if self._n_unproven > UNPROVEN:
+            self.blame('the whole rest of a motion is not proven any more')
+
     def _judge_missed(self, state: ControllerState) -> None:
         """Judge whether a stop that the controller has rejected is repeated."""
         world, last = self._world, self._last
@@ -219,8 +241,9 @@ class Judge:
         assert rules is not None
         speed = rules.rules.contact_speed
         near = distances_to(the_arm(), q, v, person.names, rows, speed, 0.01)
-        is_fast: Array = near.fast < 0.0
-        self.found.n_contacts = int((near.whole.min(axis=(1, 2)) < 0.0).sum())
+        # An arm of bars without flesh is in a box at a distance of 0.
+        is_fast, is_slow = near.fast <= 0.0, near.whole <= 0.0
+        self.found.n_contacts = int((is_slow & ~is_fast).any(axis=(1, 2)).sum())
         if is_fast.any():
             k = int(np.argwhere(is_fast.any(axis=(1, 2)))[0, 0])
             pace = float(near.speeds[k][is_fast[k]].max())

@@ -16,8 +16,8 @@ TORSO = np.array([0.3, 0.4, 0.6]), np.array([0.35, 0.0, -0.3])
 # The share of ways that lead to the arm, and that end with a rest [-]; how long that lasts [s].
 REACHES, RESTS, REST = 0.6, 0.3, 1.0
 AWAY = np.array([4.0, 4.0, 0.0])
-# How far from the arm the second hand is where it is seen for the first time [m].
-FIRST_SEEN = 1.6
+# How far from the arm hands of others are where they are seen for the first time [m].
+FIRST_SEEN = (0.9, 1.6)
 
 
 class Hand:
@@ -85,22 +85,31 @@ class Hand:
 
 
 class Person:
-    """A torso that stands, and two hands; the second one is seen later."""
+    """
+    A torso that stands, a hand, and hands of others that come in later.
 
-    names = ('torso', 'hand', 'other hand')
+    They stay for a moment, as one that came from behind a curtain; then they go.
+    """
+
+    names = ('torso', 'hand', *(f'hand of another {k}' for k in range(1, 4)))
 
     def __init__(self, rng: np.random.Generator, aim: Callable[[float], Array]) -> None:
-        """Place the hands, one of them further away."""
-        direction = rng.normal(size=3)
-        direction[0] = abs(direction[0])
-        far = FIRST_SEEN * direction / np.linalg.norm(direction)
-        self._far = far
-        self.hands = [Hand(rng, rng.uniform(*PLACES), aim), Hand(rng, far, aim)]
+        """Place the hands, those of others further away."""
+        self.hand = Hand(rng, rng.uniform(*PLACES), aim)
+        self.others = []
+        for _ in self.names[2:]:
+            direction = rng.normal(size=3)
+            direction[0] = abs(direction[0])
+            far = float(rng.uniform(*FIRST_SEEN)) * direction / np.linalg.norm(direction)
+            self.others.append(Hand(rng, far, aim))
         self._turn = np.eye(3).ravel()
 
     def rows_at(self, time: float) -> Array:
-        """Return torso and hands at a time [s], (3, 15)."""
+        """Return torso and hands at a time [s], (5, 15)."""
         size, place = TORSO
         torso = np.concatenate([place, size, self._turn])
-        hands = [np.concatenate([hand.place_at(time), HAND, self._turn]) for hand in self.hands]
+        hands = [
+            np.concatenate([hand.place_at(time), HAND, self._turn])
+            for hand in (self.hand, *self.others)
+        ]
         return np.array([torso, *hands])

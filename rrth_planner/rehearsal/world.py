@@ -36,6 +36,8 @@ from rrth_planner.simulation.trajectory_controller import (
 JOINT_PERIOD, CHECK_PERIOD = 0.01, 0.02
 # Where parts will be follows from two sights that are so far apart [s].
 STEADY, LATELY = 0.08, 0.25
+# A host that has other things to do decides so much later [s].
+HESITATION = 0.04
 # Virtual time begins then [s]: stamps are positive.
 BEGIN = 1000.0
 
@@ -68,6 +70,8 @@ class Wire:
         How long a message takes to the controller: from, to [s].
     deciding : (float, float)
         How long a decision takes: from, to [s].
+    hesitating : float
+        The share of decisions that take up to `HESITATION` [-].
     body_timeout, joint_timeout : float
         [s].
     keep_lost : float
@@ -81,6 +85,7 @@ class Wire:
     doubled: float = 0.0
     transport: tuple[float, float] = (0.001, 0.005)
     deciding: tuple[float, float] = (0.0002, 0.0015)
+    hesitating: float = 0.0
     body_timeout: float = 0.2
     joint_timeout: float = 0.2
     keep_lost: float = 2.0
@@ -263,6 +268,8 @@ class World:
 
     def _deciding(self) -> float:
         self._took = float(self.rng.uniform(*self.wire.deciding))
+        if self.wire.hesitating and self.rng.random() < self.wire.hesitating:
+            self._took = float(self.rng.uniform(self._took, HESITATION))
         return self._took
 
     def send(self, command: Command) -> None:
