@@ -26,6 +26,8 @@ from benchmarks.separation.setting import the_arm
 # A message continues the one before it: its first setpoint may be due so long after both part [s],
 # by no more than the greatest jerk makes of that; and rounding [rad, rad/s].
 PARTED, APART, APART_SPEED = 8e-3, 3e-6, 3e-4
+# At rest a motion may begin where encoders read the arm, as the mean of a while [rad].
+APART_AT_REST = 1e-4
 # A rejected message leaves the controller on another curve than what comes later continues: for
 # so long its steps are not judged [s].
 REJECTED = 2.0
@@ -137,7 +139,8 @@ class Judge:
         apart = float(np.abs(setpoint.positions - former.positions).max())
         faster = float(np.abs(setpoint.velocities - former.velocities).max())
         jerk = float(self._world.rules.stop_limits.jerk.max())
-        if apart > APART + jerk * PARTED**3 / 6:
+        is_at_rest = not former.velocities.any()
+        if apart > (APART_AT_REST if is_at_rest else APART + jerk * PARTED**3 / 6):
             self.blame(f'a setpoint jumps, {apart:.2e} rad')
         elif faster > APART_SPEED + jerk * PARTED**2 / 2:
             self.blame(f'a setpoint jumps in speed, {faster:.4f} rad/s')
