@@ -31,6 +31,8 @@ CHAOS, CALM = 15.0, 6.0
 PAUSE = (0.03, 0.5)
 # A handover is planned from what is commanded then, so much later [s].
 HANDOVER = 0.045
+# The share of motions that are stopped soon, which the controller misses [-].
+MISSES = 0.1
 # A hand of another stays where it came in for so long [s].
 STAYS = 1.0
 GOAL = PointingGoal(np.array([1.5, 0.1, 0.3]))
@@ -115,9 +117,7 @@ class Episode:
         elif what < 0.75:
             self._fail('an error', is_fault=True)
         elif what < 0.78:
-            # The controller misses the stop.
-            self._reject(now + float(rng.uniform(0.01, 0.1)))
-            self._fail('cancelled', is_fault=False)
+            self._miss_stop()
         elif what < 0.82:
             world.stands_until = now + float(rng.uniform(0.01, 0.4))
         elif what < 0.85:
@@ -144,6 +144,12 @@ class Episode:
         self.judge.expect_stop(why)
         self.judge.is_faulty |= is_fault and self.world.monitor.watch.running is not None
         self.world.monitor.fail(why, is_replanned=False, is_fault=is_fault)
+
+    def _miss_stop(self) -> None:
+        """Have the arm be stopped, and the controller miss that."""
+        if not self._is_calm and not self.world.is_still:
+            self._reject(self.world.timeline.now + float(self._rng.uniform(0.02, 0.1)))
+            self._fail('cancelled', is_fault=False)
 
     def _reset(self) -> None:
         self.judge.is_faulty = False
@@ -245,6 +251,8 @@ class Episode:
         finally:
             self.judge.is_beginning = False
         self.judge.begun()
+        if not self._is_calm and self._rng.random() < MISSES:
+            world.timeline.after(float(self._rng.uniform(0.1, 0.4)), self._miss_stop)
         return True
 
     def _judge_end(self) -> None:

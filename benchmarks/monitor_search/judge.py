@@ -37,7 +37,7 @@ PROMPT = 0.06
 UNPROVEN = 3
 # An arm that misses a stop is given it again within so long [s], where it is further off the stop
 # than this [rad], and faster than this [rad/s].
-AGAIN, OFF_STOP, MOVES = 0.4, 0.06, 0.1
+AGAIN, OFF_STOP, MOVES = 0.25, 0.03, 0.1
 
 
 @dataclass(slots=True)
