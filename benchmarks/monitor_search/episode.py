@@ -156,7 +156,8 @@ class Episode:
         self.world.take(Reset(self.world.moment()))
 
     def _reject(self, until: float) -> None:
-        self.world.rejects_until = self.judge.rejected = until
+        self.world.rejects_until = until
+        self.judge.reject(until)
 
     def _show(self) -> None:
         self.world.hidden -= {'hand'}

@@ -14,6 +14,7 @@ import math
 import numpy as np
 from rrth_planner.execution.commitments import is_separate
 from rrth_planner.execution.decision import Command
+from rrth_planner.execution.tracked_motion import OFF_COMMAND
 from rrth_planner.execution.watch import MonitorState
 from rrth_planner.model.trajectory import positions_at
 from rrth_planner.rehearsal.world import World
@@ -26,8 +27,9 @@ from benchmarks.separation.setting import the_arm
 # A message continues the one before it: its first setpoint may be due so long after both part [s],
 # by no more than the greatest jerk makes of that; and rounding [rad, rad/s].
 PARTED, APART, APART_SPEED = 8e-3, 3e-6, 3e-4
-# At rest a motion may begin where encoders read the arm, as the mean of a while [rad].
-APART_AT_REST = 1e-4
+# After a rejected message an arm at rest may be so far from what it was commanded, unnoticed, and
+# its next motion begins there [rad].
+UNNOTICED = OFF_COMMAND + 1e-3
 # A rejected message leaves the controller on another curve than what comes later continues: for
 # so long its steps are not judged [s].
 REJECTED = 2.0
@@ -85,8 +87,8 @@ class Judge:
         self.times: list[float] = []
         self.states: list[ControllerState] = []
         self.has_ended = False
-        # Until when the controller rejected [s].
-        self.rejected = -math.inf
+        # Until when the controller rejected [s], and whether no motion has begun at rest since.
+        self.rejected, self.is_apart = -math.inf, False
         # Whether no motion may begin until a reset.
         self.is_faulty = False
         self.is_beginning = False
@@ -116,6 +118,10 @@ class Judge:
         if self.is_faulty:
             self.blame('a motion begins after a fault')
 
+    def reject(self, until: float) -> None:
+        """Take note that the controller rejects what comes until then [s]."""
+        self.rejected, self.is_apart = until, True
+
     def _sent(self, command: Command) -> None:
         self._last, self._n_missed = (command, self._world.timeline.now), 0
         motion = command.motion.trajectory
@@ -139,8 +145,10 @@ class Judge:
         apart = float(np.abs(setpoint.positions - former.positions).max())
         faster = float(np.abs(setpoint.velocities - former.velocities).max())
         jerk = float(self._world.rules.stop_limits.jerk.max())
-        is_at_rest = not former.velocities.any()
-        if apart > (APART_AT_REST if is_at_rest else APART + jerk * PARTED**3 / 6):
+        is_apart = self.is_apart and not former.velocities.any()
+        if is_apart:
+            self.is_apart = False
+        if apart > (UNNOTICED if is_apart else APART + jerk * PARTED**3 / 6):
             self.blame(f'a setpoint jumps, {apart:.2e} rad')
         elif faster > APART_SPEED + jerk * PARTED**2 / 2:
             self.blame(f'a setpoint jumps in speed, {faster:.4f} rad/s')
