@@ -164,12 +164,13 @@ class Episode:
 
     def _move_hands(self) -> None:
         world, person = self.world, self._person
-        now = world.timeline.now
+        now, is_whole = world.timeline.now, world.monitor.watch.commitments.is_whole
         if not self._is_calm:
             person.hand.go_on(now)
         others = zip(person.names[2:], person.others, self._seen_from, strict=True)
         for name, hand, since in others:
-            if now >= since and name in world.hidden:
+            # Where the arm was given the whole rest of its motion, that matters most.
+            if now >= since and is_whole and name in world.hidden:
                 world.hidden -= {name}
                 hand.leave(now + STAYS)
 

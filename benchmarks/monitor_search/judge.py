@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import math
 
 import numpy as np
-from rrth_planner.execution.commitments import is_separate
+from rrth_planner.execution.commitments import is_separate, LATEST
 from rrth_planner.execution.decision import Command
 from rrth_planner.execution.tracked_motion import OFF_COMMAND
 from rrth_planner.execution.watch import MonitorState
@@ -124,6 +124,8 @@ class Judge:
 
     def _sent(self, command: Command) -> None:
         self._last, self._n_missed = (command, self._world.timeline.now), 0
+        if command.within < math.inf and self._world.took > LATEST:
+            self.blame('a commitment is published too late')
         motion = command.motion.trajectory
         if motion.velocities[-1].any() or motion.accelerations[-1].any():
             self.blame('a command does not end at rest')

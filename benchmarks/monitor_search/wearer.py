@@ -17,7 +17,7 @@ TORSO = np.array([0.3, 0.4, 0.6]), np.array([0.35, 0.0, -0.3])
 REACHES, RESTS, REST = 0.6, 0.3, 1.0
 AWAY = np.array([4.0, 4.0, 0.0])
 # How far from the arm hands of others are where they are seen for the first time [m].
-FIRST_SEEN = (0.9, 1.6)
+FIRST_SEEN = (0.8, 1.4)
 
 
 class Hand:

@@ -140,7 +140,8 @@ class World:
         self._scene, self._measured = Scene(()), -math.inf
         # Each part as it was seen last, and when [s].
         self._parts: dict[str, tuple[Box, float]] = {}
-        self._took = 0.0
+        # How long the last decision took [s].
+        self.took = 0.0
         self._sights: deque[tuple[float, Scene]] = deque(maxlen=64)
         self._last_arrival = -math.inf
         # What the controller was given last.
@@ -267,10 +268,10 @@ class World:
             self.monitor.take(BodyCame(self.moment(), sight, look), self.timeline.now - came)
 
     def _deciding(self) -> float:
-        self._took = float(self.rng.uniform(*self.wire.deciding))
+        self.took = float(self.rng.uniform(*self.wire.deciding))
         if self.wire.hesitating and self.rng.random() < self.wire.hesitating:
-            self._took = float(self.rng.uniform(self._took, HESITATION))
-        return self._took
+            self.took = float(self.rng.uniform(self.took, HESITATION))
+        return self.took
 
     def send(self, command: Command) -> None:
         """Publish a command; raise ConnectionError where the middleware fails."""
@@ -287,7 +288,7 @@ class World:
             accelerations=motion.accelerations,
         )
         # A commitment is published so long after the body for which it was found.
-        sent = now + (self._took if command.within < math.inf else 0.0)
+        sent = now + (self.took if command.within < math.inf else 0.0)
         arrives = max(sent + float(self.rng.uniform(*self.wire.transport)), self._last_arrival)
         self._last_arrival = arrives
         self.timeline.at(arrives, lambda: self._arrive(points, command))
