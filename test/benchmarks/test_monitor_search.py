@@ -2,8 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The search for orders of events: the same twice, without a fault, and it finds known ones."""
 
-from benchmarks.monitor_search.__main__ import found_of, main
 import pytest
+
+pytest.importorskip('tqdm')
+
+from benchmarks.monitor_search.__main__ import found_of, main
 
 SEEDS = (0, 1, 2)
 
@@ -27,8 +30,6 @@ def test_an_episode_is_the_same_twice_and_has_no_fault(seed):
 )
 def test_a_fault_that_is_put_back_is_found(fault, seed, what):
     assert any(what in found for found in found_of(fault, seed).faults)
-    # It holds for its episode only.
-    assert found_of('', seed).faults == []
 
 
 def test_the_command_prints_a_table_and_ends_with_1_where_there_is_a_fault(capsys):
