@@ -20,20 +20,13 @@ def test_an_episode_is_the_same_twice_and_has_no_fault(seed):
     assert found_of('', seed) == found
 
 
-# The seeds that find them.
-@pytest.mark.parametrize(
-    ('fault', 'seed', 'what'),
-    [
-        ('stop_cut_off', 0, 'a command does not end at rest'),
-        ('fault_without_effect', 1, 'a motion begins after a fault'),
-    ],
-)
-def test_a_fault_that_is_put_back_is_found(fault, seed, what):
-    assert any(what in found for found in found_of(fault, seed).faults)
+def test_a_fault_that_is_put_back_is_found():
+    faults = found_of('fault_without_effect', 1).faults
+    assert any('a motion begins after a fault' in fault for fault in faults)
 
 
 def test_the_command_prints_a_table_and_ends_with_1_where_there_is_a_fault(capsys):
-    assert main(['--seeds', '3', '--fault', 'reset_without_effect']) == 1
+    assert main(['--seeds', '3', '--fault', 'stop_cut_off']) == 1
     out = capsys.readouterr().out
     assert '| episodes | events |' in out
-    assert 'seed 0: no motion begins any more' in out
+    assert 'seed 0: a command does not end at rest' in out
