@@ -214,7 +214,9 @@ class Episode:
             q, v, a = (row[0] for row in sample(command.trajectory, [since]))
             end = np.clip(q + 0.5 * v, *the_arm().bounds)
             still = np.zeros_like(q)
-            motion = Trajectory([0.0, 1.2], [q, end], [v, still], [a, still])
+            motion = Trajectory(
+                *(np.array(x) for x in ([0.0, 1.2], [q, end], [v, still], [a, still]))
+            )
             self._begin(motion, then, since, command)
         world.take(Hold(world.moment(), -math.inf))
 

@@ -15,6 +15,7 @@ from unittest.mock import patch
 
 import numpy as np
 from rrth_planner.execution import (
+    body_motion,
     command,
     commitment,
     commitments,
@@ -28,6 +29,7 @@ from rrth_planner.model.trajectory import part_of, Trajectory
 from rrth_planner.rehearsal import virtual_monitor
 from rrth_planner.rehearsal.virtual_monitor import VirtualMonitor
 from rrth_planner.rehearsal.world import World
+from rrth_planner.timing.fast_stop import fast_stop as fast_stop_of
 
 Patches = list[tuple[Any, str, Any]]
 
@@ -55,7 +57,7 @@ def _stop_from_reading() -> Patches:
 
 def _stop_cut_off() -> Patches:
     """End stops a little before they are at rest."""
-    former = command.fast_stop
+    former = fast_stop_of
 
     def fast_stop(*given: Any) -> Trajectory:
         stop = former(*given)
@@ -66,7 +68,7 @@ def _stop_cut_off() -> Patches:
 
 def _commitment_cut_off() -> Patches:
     """Publish commitments without the end of their stops."""
-    former = commitments.led
+    former = command.led
 
     def led(lead: Any, after: Any) -> Any:
         motion = former(lead, after)
@@ -125,7 +127,7 @@ def _other_command_continued() -> Patches:
 
 def _age_ignored() -> Patches:
     """Take the wearer to be where he was seen last."""
-    former = commitments.body_at
+    former = body_motion.body_at
 
     def body_at(body: Any, time: float, rules: Any) -> Any:
         return former(replace(body, measured=np.full(len(body.measured), time)), time, rules)
