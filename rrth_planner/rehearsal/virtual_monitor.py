@@ -86,11 +86,12 @@ class VirtualMonitor:
 
     def _take(self, event: Event, waited: float) -> None:
         self.n_events += 1
-        took = self._takes()
-        decision = self._carried_out(decide(self.watch, event), took)
+        took, decision = self._takes(), decide(self.watch, event)
+        # Also of one that is too late to be published.
+        command = decision.command
+        decision = self._carried_out(decision, took)
         self.watch = decision.watch
         self._note(event, decision)
-        command = decision.command
         if took and command is not None and command.within < math.inf:
             self._take(CommitmentTook(event.at, took), 0.0)
         if decision.next is not None:

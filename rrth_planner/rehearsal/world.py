@@ -8,7 +8,7 @@ take their time, a host that stands still, a middleware that fails, a controller
 """
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 import math
 from typing import Protocol
@@ -38,6 +38,8 @@ JOINT_PERIOD, CHECK_PERIOD = 0.01, 0.02
 STEADY, LATELY = 0.08, 0.25
 # A tracker's noise [m].
 MOVED = 0.01
+# A host that has other things to do decides so much later [s].
+HESITATION = 0.04
 # Virtual time begins then [s]: stamps are positive.
 BEGIN = 1000.0
 
@@ -64,12 +66,14 @@ class Wire:
         Of the tracker [s].
     age : (float, float)
         How old a frame is that comes: from, to [s].
-    loss : float
-        The share of frames that never come [-].
+    loss, doubled : float
+        The shares of frames that never come, and of those that come twice [-].
     transport : (float, float)
         How long a message takes to the controller: from, to [s].
     deciding : (float, float)
         How long a decision takes: from, to [s].
+    hesitating : float
+        The share of decisions that take up to `HESITATION` [-].
     body_timeout, joint_timeout : float
         [s].
     keep_lost : float
@@ -80,8 +84,10 @@ class Wire:
     frame_period: float = 1 / 60
     age: tuple[float, float] = (0.01, 0.03)
     loss: float = 0.0
+    doubled: float = 0.0
     transport: tuple[float, float] = (0.001, 0.005)
     deciding: tuple[float, float] = (0.0002, 0.0015)
+    hesitating: float = 0.0
     body_timeout: float = 0.2
     joint_timeout: float = 0.2
     keep_lost: float = 2.0
@@ -117,26 +123,33 @@ class World:
         self.rng = np.random.default_rng(seed)
         self.timeline = Timeline(BEGIN)
         self.arm = LaggingArm(q, controller_period, lag, controller, BEGIN)
-        self.monitor = VirtualMonitor(rules, self.moment, self.look, self._send, self._deciding)
+        self.monitor = VirtualMonitor(rules, self.moment, self.look, self.send, self._deciding)
         # Until when the host stands still, the middleware fails, frames are lost and the
         # controller rejects what it is given [s].
         self.stands_until = self.fails_until = self.blind_until = self.rejects_until = -math.inf
+        # Parts that the tracker does not see now.
+        self.hidden: frozenset[str] = frozenset()
         # For those who judge: each cycle's command, and when it is due [s]; where another message
-        # counts from there on, what the one before commands then, too; each message.
+        # counts from there on, what the one before commands then, too; each message, and each one
+        # that could not be sent; when each frame that comes was measured [s], and its parts.
         self.on_setpoint: Callable[[float, ControllerState], None] = lambda time, state: None
         self.on_join: Callable[[float, ControllerState, ControllerState], None] = lambda *_: None
         self.on_command: Callable[[Command], None] = lambda command: None
+        self.on_unsent: Callable[[Command], None] = lambda command: None
+        self.on_frame: Callable[[float, tuple[str, ...]], None] = lambda *_: None
         self._reading: JointReading | None = None
         # The newest sight and the last ones, by when they came [s].
         self._scene, self._measured = Scene(()), -math.inf
         # Of each part that has been seen: its box, and when it was measured last [s].
         self._parts: dict[str, tuple[Box, float]] = {}
+        # How long the last decision took [s].
+        self.took = 0.0
         self._sights: deque[tuple[float, Scene]] = deque(maxlen=64)
         self._last_arrival = -math.inf
         # What the controller was given last.
         self.arrived: Command | None = None
         # Bodies that came while the host stood still.
-        self._waiting: list[tuple[float, Sequence[Box], float]] = []
+        self._waiting: list[tuple[float, tuple[Box, ...], float]] = []
         timeline, rng = self.timeline, self.rng
         timeline.every(controller_period, self._cycle)
         timeline.every(JOINT_PERIOD, self._read, float(rng.uniform(0.0, JOINT_PERIOD)))
@@ -258,43 +271,56 @@ class World:
             return
         rows = self.wearer.rows_at(now)
         rows.setflags(write=False)
-        is_seen = np.isfinite(rows.sum(axis=1)).tolist()
-        boxes = [
+        known = np.isfinite(rows.sum(axis=1)).tolist()
+        boxes = zip(self.wearer.names, rows, known, strict=True)
+        seen = tuple(
             Box.of_row(name, row)
-            for name, row, seen in zip(self.wearer.names, rows, is_seen, strict=True)
-            if seen
-        ]
-        if boxes:
-            self.timeline.after(age, lambda: self._body_came(boxes, now))
+            for name, row, is_seen in boxes
+            if is_seen and name not in self.hidden
+        )
+        if not seen:
+            return
+        self.timeline.after(age, lambda: self._body_came(seen, now))
+        if wire.doubled and self.rng.random() < wire.doubled:
+            again = float(self.rng.uniform(*wire.age))
+            self.timeline.after(again, lambda: self._body_came(seen, now))
 
-    def _body_came(self, boxes: Sequence[Box], measured: float) -> None:
-        self._waiting.append((self.timeline.now, boxes, measured))
+    def _body_came(self, seen: tuple[Box, ...], measured: float) -> None:
+        self._waiting.append((self.timeline.now, seen, measured))
         if not self.is_still:
             self._take_waiting()
+
+    def is_new(self, measured: float) -> bool:
+        """Return whether a body was measured [s] after all that came before it."""
+        return measured > self._measured
 
     def _take_waiting(self) -> None:
         """Have all bodies seen that came, and the newest one checked."""
         waiting, self._waiting = self._waiting, []
-        for k, (came, boxes, measured) in enumerate(waiting):
-            if measured <= self._measured:
-                # A newer one came before it.
+        for k, (came, seen, measured) in enumerate(waiting):
+            self.on_frame(measured, tuple(box.name for box in seen))
+            if not self.is_new(measured):
                 continue
-            # A part that is lost stays where it was.
-            self._parts |= {box.name: (box, measured) for box in boxes}
-            scene = Scene(tuple(box for box, _ in self._parts.values()))
-            taken = np.array([time for _, time in self._parts.values()])
-            self._scene, self._measured = scene, measured
-            self._sights.append((self.timeline.now, scene))
-            sight = Sight(scene, taken)
+            # A part that is not shown is lost: it is taken to be where it was.
+            self._parts.update((box.name, (box, measured)) for box in seen)
+            self._scene = Scene(tuple(box for box, _ in self._parts.values()))
+            self._measured = measured
+            self._sights.append((self.timeline.now, self._scene))
+            sight = Sight(self._scene, np.array([then for _, then in self._parts.values()]))
             look = self.look() if k == len(waiting) - 1 else None
             self.monitor.take(BodyCame(self.moment(), sight, look), self.timeline.now - came)
 
     def _deciding(self) -> float:
-        return float(self.rng.uniform(*self.wire.deciding))
+        self.took = float(self.rng.uniform(*self.wire.deciding))
+        if self.wire.hesitating and self.rng.random() < self.wire.hesitating:
+            self.took = float(self.rng.uniform(self.took, HESITATION))
+        return self.took
 
-    def _send(self, command: Command) -> None:
+    def send(self, command: Command) -> None:
+        """Publish a command; raise ConnectionError where the middleware fails."""
         now = self.timeline.now
         if now < self.fails_until:
+            self.on_unsent(command)
             raise ConnectionError('no middleware')
         self.on_command(command)
         motion = command.motion.trajectory
@@ -304,7 +330,9 @@ class World:
             velocities=motion.velocities,
             accelerations=motion.accelerations,
         )
-        arrives = max(now + float(self.rng.uniform(*self.wire.transport)), self._last_arrival)
+        # A commitment is published so long after the body for which it was found.
+        sent = now + (self.took if command.within < math.inf else 0.0)
+        arrives = max(sent + float(self.rng.uniform(*self.wire.transport)), self._last_arrival)
         self._last_arrival = arrives
         self.timeline.at(arrives, lambda: self._arrive(points, command))
 
