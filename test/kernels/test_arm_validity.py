@@ -28,6 +28,7 @@ from rrth_planner.kernels.collision.arm_validity import (
 )
 from rrth_planner.kernels.jit import CHAIN, first_class, kernel, MAT, VEC
 from rrth_planner.kernels.layout import BOX_ALLOWED, BOX_HALF, BOX_OFFSET, BOX_ROWS, D
+from rrth_planner.model.errors import RrthError
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.planning.planner import plan
@@ -334,7 +335,8 @@ def test_a_configuration_that_is_none_is_never_free(value):
         q = FOLDED.copy()
         q[k] = value
         assert not is_configuration_free(q, RAY, world.chain, world.robot, world.obstacles)
-        assert not world.is_valid(q)
+        with pytest.raises(RrthError, match='expected finite numbers'):
+            world.is_valid(q)
     assert not is_configuration_free(FOLDED, np.nan, world.chain, world.robot, world.obstacles)
 
 

@@ -241,7 +241,7 @@ def test_whatever_goes_wrong_is_answered(start, monkeypatch, tmp_path):
         patch.setattr(in_process_planner, 'plan_question', fail)
         message = stranger.answer().message
     sentence = 'FAILURE (99999): planning failed unexpectedly: ZeroDivisionError: of a test; '
-    (file,) = tmp_path.iterdir()
+    (file,) = tmp_path.glob('incident-*')
     assert message == f'{sentence}to replay it: ./run exec replay {file}; answer 1'
     assert not stranger.received['joint_trajectory']
     assert stranger.answer().success
@@ -260,7 +260,7 @@ def test_a_planning_process_that_dies_is_an_answer_and_no_end(start, monkeypatch
     assert message.startswith('FAILURE (99999): planning failed unexpectedly: PlanningProcessErr')
     assert 'ended with code -9' in message
     # What was asked is kept, to be asked again.
-    assert len(list(tmp_path.iterdir())) == 1
+    assert len(list(tmp_path.glob('incident-*'))) == 1
     assert not stranger.received['joint_trajectory']
     assert stranger.answer().success
 

@@ -267,7 +267,7 @@ def test_both_checkers_are_asked_when_the_wearer_moved(start, monkeypatch, wait_
     message = stranger.answer().message
     assert message.startswith('FAILURE (99999): the two collision checks disagree: ray is 0.0100')
     assert not stranger.received['joint_trajectory']
-    (file,) = tmp_path.iterdir()
+    (file,) = tmp_path.glob('incident-*')
     incident = read_incident(file)
     # Planned for two boxes, checked for three.
     assert len(incident.question.scene.boxes) == 2

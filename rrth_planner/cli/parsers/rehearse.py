@@ -5,6 +5,7 @@
 import argparse
 from pathlib import Path
 
+from rrth_planner.cli.numbers import integer, number
 from rrth_planner.cli.program import command_parser
 
 DESCRIPTION = """\
@@ -36,8 +37,13 @@ def parser() -> argparse.ArgumentParser:
     command = command_parser('rehearse', DESCRIPTION, EPILOG)
     add = command.add_argument
     add('scenario', metavar='SCENARIO', help='a file (YAML), or the name of one that comes along')
-    add('--seed', type=int, metavar='N', help='another seed than that of the scenario')
-    add('--seconds', type=float, metavar='S', help='another length in virtual time [s]')
+    add('--seed', type=integer, metavar='N', help='another seed than that of the scenario')
+    add(
+        '--seconds',
+        type=number('s', above=0.0),
+        metavar='S',
+        help='another length in virtual time [s]',
+    )
     add(
         '--plot',
         type=Path,
