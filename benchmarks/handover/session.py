@@ -341,10 +341,10 @@ class _Session:
         )
         body = WearerBody(parts)
         self._inputs.body.accept(lambda: body, now - BODY_AGE)
-        n_stops, first = self._monitor.n_stops, len(self._sent)
+        n_stops, first = self._monitor.watch.n_stops, len(self._sent)
         self._kind = EXTENSION
         self._monitor.on_body(body, time.time_ns())
-        if self._monitor.n_stops > n_stops:
+        if self._monitor.watch.n_stops > n_stops:
             self._sent[first:] = [(c, STOP, p, s) for c, _, p, s in self._sent[first:]]
 
     def _read(self) -> None:
@@ -360,9 +360,9 @@ class _Session:
     def _replace(self) -> None:
         """Have the running motion replaced, or a first one begin."""
         monitor = self._monitor
-        if monitor.running is not None:
+        if monitor.watch.running is not None:
             self._pass(float(self._rng.uniform(*LATER)))
-            if monitor.is_monitoring and self._rng.random() < STOPS:
+            if monitor.watch.is_monitoring and self._rng.random() < STOPS:
                 self._kind = STOP
                 monitor.brake('no longer wanted')
                 # Sometimes another motion follows at once.

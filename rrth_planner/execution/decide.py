@@ -148,6 +148,10 @@ def _begun(watch: Watch, event: events.Begin) -> Decision:
             f'{watch.unsettled_by} less than {SETTLING:g} s ago: the ages of body and joints are '
             'not known yet',
         )
+    if watch.pending is not None:
+        raise RequestError(
+            ErrorCode.FAILURE, f'a stop of the arm could not be published: {watch.pending.why}'
+        )
     before, command = event.planned_from, watch.tracked.command
     if before is not None and (command is None or not is_same(before, command)):
         raise RequestError(

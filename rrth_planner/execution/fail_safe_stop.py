@@ -94,6 +94,20 @@ def stopped_for_body(
 ) -> Decision:
     """Command a stop before the wearer; is_safe: whether it is proven free of him."""
     found, stop = stopped(watch, at, stop, why)
+    return _said(found, lambda: _said_for_body(found, at, stop, is_safe, scene, why))
+
+
+def _said(found: Decision, say: Callable[[], Decision]) -> Decision:
+    """Return a stop with what is said of it; an error in that does not keep it back."""
+    try:
+        return say()
+    except Exception:
+        return changed(found, lines=(*found.lines, Line(Level.ERROR, traceback.format_exc())))
+
+
+def _said_for_body(
+    found: Decision, at: Moment, stop: ExecutingMotion, is_safe: bool, scene: Scene, why: str
+) -> Decision:
     watch = changed(found.watch, stop_level=Level.WARN)
     sentence = _sentence(watch, at, stop)
     watch = entered(watch, MonitorState.STOPPING, sentence, Level.WARN)
@@ -122,9 +136,10 @@ def said_unproven(watch: Watch, event: StopUnproven) -> Decision:
 def pending(watch: Watch, event: Fail) -> Watch:
     """Return it with a stop to be published, if a motion is monitored; this never fails."""
     why, is_replanned = event.why, event.is_replanned
-    if watch.running is None:
-        return watch
+    # Also at rest: what is planned meanwhile was planned with what failed.
     watch = changed(watch, n_faults=watch.n_faults + event.is_fault)
+    if watch.running is None:
+        return changed(watch, stop_reason=why) if event.is_fault else watch
     if watch.is_monitoring:
         # What is not to be planned again does not become so by what fails later.
         is_replanned = is_replanned and (watch.pending is None or watch.pending.is_replanned)
@@ -170,9 +185,15 @@ def _pending_stopped(watch: Watch, at: Moment) -> Decision:
         # The motion has ended.
         return Decision(watch=changed(watch, pending=None))
     found, motion = stopped(watch, at, stop_of(watch, at, running, phase), stop.why)
+    return _said(found, lambda: _said_of_pending(found, at, motion, stop.is_replanned))
+
+
+def _said_of_pending(
+    found: Decision, at: Moment, motion: ExecutingMotion, is_replanned: bool
+) -> Decision:
     sentence = _sentence(found.watch, at, motion)
-    watch = entered(found.watch, MonitorState.STOPPING, sentence, watch.stop_level)
-    watch = recorded(watch, motion.trajectory, None, at.rules, stop.is_replanned)
+    watch = entered(found.watch, MonitorState.STOPPING, sentence, found.watch.stop_level)
+    watch = recorded(watch, motion.trajectory, None, at.rules, is_replanned)
     return changed(found, watch=watch, lines=(*found.lines, Line(Level.WARN, sentence)))
 
 

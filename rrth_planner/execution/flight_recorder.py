@@ -95,6 +95,8 @@ class Replayed:
         From 0.
     watch : Watch
         What is known after it.
+    command : Command or None
+        None: nothing was published.
     is_same : bool
         Whether the same was commanded.
 
@@ -327,5 +329,5 @@ def _decided(watch: Watch, event: Event, entry: Entry) -> tuple[Watch, Command |
     if entry.fate is Fate.OTHERWISE:
         is_same = decision.otherwise is not None
         after = decision.otherwise or decision
-        return after.watch, command, is_same
+        return after.watch, None, is_same
     return decision.watch, command, digest == entry.command

@@ -50,9 +50,11 @@ def write_incident(incident: Incident, folder: Path) -> Path:
     return write_record(content, folder, 'incident', incident.time, '.yaml')
 
 
-def write_record(content: bytes, folder: Path, kind: str, time: str, suffix: str) -> Path:
+def write_record(
+    content: bytes, folder: Path, kind: str, time: str, suffix: str, most: int = MOST_FILES
+) -> Path:
     """
-    Write a new file of a kind to a folder, and remove the oldest of that kind beyond a hundred.
+    Write a new file of a kind to a folder, and remove the oldest of that kind beyond `most`.
 
     time: as ISO 8601 has it. Creates the folder if needed, and writes the file atomically; raises
     OSError where it cannot.
@@ -67,7 +69,7 @@ def write_record(content: bytes, folder: Path, kind: str, time: str, suffix: str
     finally:
         fresh.unlink(missing_ok=True)
     with suppress(OSError):
-        _remove_oldest(folder, path, f'{kind}-*{suffix}')
+        _remove_oldest(folder, path, f'{kind}-*{suffix}', most)
     return path
 
 
@@ -78,11 +80,11 @@ def read_incident(path: Path) -> Incident:
         return incident_from_mapping(data)
 
 
-def _remove_oldest(folder: Path, newest: Path, pattern: str) -> None:
+def _remove_oldest(folder: Path, newest: Path, pattern: str, most: int) -> None:
     """Remove the oldest files; the newest stays, whatever its time stamp."""
     others = [file for file in folder.glob(pattern) if file != newest]
     others.sort(key=lambda file: (file.stat().st_mtime_ns, file.name), reverse=True)
-    for file in others[MOST_FILES - 1 :]:
+    for file in others[most - 1 :]:
         file.unlink(missing_ok=True)
 
 

@@ -19,13 +19,20 @@ from rrth_planner.model.separation import Separation, SeparationRules
 from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner
 from rrth_planner.rehearsal.rehearsed_wearer import (
+    HAND_PERIOD,
     Hidden,
     InterceptingWearer,
-    LOOKS,
     RecordedWearer,
 )
 from rrth_planner.rehearsal.scenario import Pair, Scenario
-from rrth_planner.rehearsal.session import Glance, IDLE, Pursuit, Session, SessionRules
+from rrth_planner.rehearsal.session import (
+    Glance,
+    GLANCE_PERIOD,
+    IDLE,
+    Pursuit,
+    Session,
+    SessionRules,
+)
 from rrth_planner.rehearsal.virtual_host import VirtualHost
 from rrth_planner.rehearsal.witness import Testimony, Witness
 from rrth_planner.rehearsal.world import BEGIN, Wire, World
@@ -66,7 +73,7 @@ class Rehearsal:
         for glance in self.glances:
             if glance.doing != IDLE and glance.rate < 1.0:
                 key = glance.doing, glance.cause
-                found[key] = found.get(key, 0.0) + LOOKS * (1.0 - glance.rate)
+                found[key] = found.get(key, 0.0) + GLANCE_PERIOD * (1.0 - glance.rate)
         return found
 
 
@@ -132,7 +139,7 @@ def rehearsed(scenario: Scenario, is_drawn: bool = False) -> Rehearsal:
             q = world.arm.measured_at(world.timeline.now).positions
             hand.advance(world.timeline.now, arm, q)
 
-        world.timeline.every(LOOKS, look)
+        world.timeline.every(HAND_PERIOD, look)
     # Latencies of their own: what is asked for is the same whatever becomes of it.
     latencies = np.random.default_rng((scenario.seed, 1))
     host = VirtualHost(

@@ -19,7 +19,7 @@ from rrth_planner.wearer.skeleton import Skeleton
 # of trackers with 30, 60 and 120 frames a second, and that of a controller with 200 Hz [s].
 INSTANT = 1 / 600
 # A hand that goes for the arm looks so often where that is [s].
-LOOKS = 0.02
+HAND_PERIOD = 0.02
 # How large it is [m].
 HAND = (0.1, 0.1, 0.2)
 
@@ -129,8 +129,8 @@ class InterceptingWearer:
         goal = tool_pose(arm, q)[:3, 3] if is_pursuing else self._home
         way = goal - place
         length = float(np.linalg.norm(way))
-        step = min(length, self._speed * LOOKS)
-        self._times.append(time + LOOKS)
+        step = min(length, self._speed * HAND_PERIOD)
+        self._times.append(time + HAND_PERIOD)
         self._places.append(place if length < 1e-12 else place + step / length * way)
 
     def rows_at(self, time: float) -> Array:

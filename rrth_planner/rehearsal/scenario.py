@@ -2,16 +2,36 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is rehearsed, as a file says it: a wearer, tracker, planner, controller, requests."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
+import math
 from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
 from rrth_planner.io.entries import mapping, number, sequence, text, whole
 from rrth_planner.io.text_file import load_yaml, naming_file
 from rrth_planner.model.errors import OptionsError, shown
+from rrth_planner.simulation.trajectory_controller import ControllerVersion
 
 Pair = tuple[float, float]
+
+
+def _require(name: str, value: float, unit: str, low: float, high: float = math.inf) -> None:
+    """Raise OptionsError unless a number is from `low` to `high`."""
+    if not low <= value <= high:
+        span = f'{low:g} to {high:g}' if high < math.inf else f'a number from {low:g} on'
+        raise OptionsError(f'{name}: {value:g}, expected {span} [{unit}]')
+
+
+def _require_spans(name: str, spans: Sequence[Pair]) -> None:
+    """Raise OptionsError unless each goes from an earlier time to a later one [s]."""
+    for begin, end in spans:
+        if not 0.0 <= begin <= end:
+            raise OptionsError(f'{name}: {begin:g} to {end:g}, expected from 0 on, upwards [s]')
+
+
+# No period is shorter [s], and no rate of a film slower [-].
+SHORTEST, SLOWEST = 1e-4, 0.01
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,6 +58,11 @@ class Recorded:
     rate: float = 1.0
     begin: float = 0.0
 
+    def __post_init__(self) -> None:
+        """Validate."""
+        _require('rate', self.rate, '-', SLOWEST, 100.0)
+        _require('begin', self.begin, 's', 0.0)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Intercepting:
@@ -63,6 +88,12 @@ class Intercepting:
     waits: float = 2.0
     pursues: float = 1.5
 
+    def __post_init__(self) -> None:
+        """Validate."""
+        _require('speed', self.speed, 'm/s', 0.0)
+        _require('waits', self.waits, 's', SHORTEST)
+        _require('pursues', self.pursues, 's', SHORTEST)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Loss:
@@ -71,6 +102,10 @@ class Loss:
     part: str
     begin: float
     end: float
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        _require_spans(f'loss of {self.part}', [(self.begin, self.end)])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,6 +133,13 @@ class Tracker:
     loses: tuple[Loss, ...] = ()
     keep_lost: float = 2.0
 
+    def __post_init__(self) -> None:
+        """Validate."""
+        _require('tracker.rate', self.rate, '1/s', SHORTEST, 1.0 / SHORTEST)
+        _require_spans('age', [self.age])
+        _require('loss', self.loss, '-', 0.0, 1.0)
+        _require('keep_lost', self.keep_lost, 's', 0.0)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answers:
@@ -105,6 +147,11 @@ class Answers:
 
     latency: Pair = (0.003, 0.05)
     dead: tuple[Pair, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        _require_spans('latency', [self.latency])
+        _require_spans('dead', self.dead)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,6 +170,11 @@ class Node:
 
     deciding: Pair = (0.0002, 0.0015)
     stands_still: tuple[Pair, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        _require_spans('deciding', [self.deciding])
+        _require_spans('stands_still', self.stands_still)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -154,6 +206,18 @@ class Execution:
     lag: float = 0.01
     transport: Pair = (0.001, 0.009)
     rejects: tuple[Pair, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        versions = [one.value for one in ControllerVersion]
+        if self.version not in versions:
+            known = ', '.join(versions)
+            raise OptionsError(f'version: {shown(self.version)}, expected one of {known}')
+        _require('controller.period', self.period, 's', SHORTEST)
+        _require('delay', self.delay, 's', 0.0)
+        _require('lag', self.lag, 's', 0.0)
+        _require_spans('transport', [self.transport])
+        _require_spans('rejects', self.rejects)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -199,6 +263,17 @@ class Requests:
     lowest: tuple[float, float, float] = (0.8, -0.6, -0.6)
     highest: tuple[float, float, float] = (1.6, 0.6, 0.0)
 
+    def __post_init__(self) -> None:
+        """Validate."""
+        _require('pause', self.pause, 's', 0.0)
+        _require('gives_up', self.gives_up, 's', 0.0)
+        _require('replaced', self.replaced, '-', 0.0, 1.0)
+        pairs = zip(self.lowest, self.highest, strict=True)
+        if any(low > high for low, high in pairs):
+            raise OptionsError(
+                f'lowest: {shown(self.lowest)}, expected at most highest {shown(self.highest)} [m]'
+            )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scenario:
@@ -235,13 +310,7 @@ class Scenario:
             raise OptionsError('scenario: expected either recorded or intercepting, one wearer')
         if self.seed < 0:
             raise OptionsError(f'seed: {self.seed}, expected a whole number >= 0')
-        for name, value, unit in (
-            ('seconds', self.seconds, 's'),
-            ('tracker.rate', self.tracker.rate, '1/s'),
-            ('controller.period', self.controller.period, 's'),
-        ):
-            if not value > 0.0:
-                raise OptionsError(f'{name}: {value:g}, expected a number > 0 [{unit}]')
+        _require('seconds', self.seconds, 's', SHORTEST)
 
 
 def load_scenario(path: str | Path) -> Scenario:
@@ -277,10 +346,8 @@ def _read(kind: Any, value: Any, name: str) -> Any:
         pairs = zip(options, items, strict=True)
         return tuple(_read(option, item, name) for option, item in pairs)
     if kind is float:
-        found = number(value, name, '-', OptionsError)
-        if found < 0.0 and not name.endswith(('home', 'lowest', 'highest')):
-            raise OptionsError(f'{name}: {found:g}, expected a number >= 0')
-        return found
+        # Its unit, and its range, are those of the field.
+        return number(value, name, 'SI', OptionsError)
     if kind is int:
         return whole(value, name, OptionsError)
     if kind is str:

@@ -50,7 +50,7 @@ RAY_PATIENCE = 2.0
 # An arm may come to rest so much later than its stop [s].
 LONGEST_SETTLING = 1.0
 # What the arm does is looked at so often [s].
-LOOKS = 0.02
+GLANCE_PERIOD = 0.02
 # An arm that aims this near to its target has arrived [m].
 AIMS = 0.02
 # Why there is no motion, where the wearer, who may move on, is in the way.
@@ -192,7 +192,7 @@ class Session:
         self.glances: list[Glance] = []
         self._pursuit: Pursuit | None = None
         self._doing, self._cause = IDLE, ''
-        world.timeline.every(LOOKS, self._glance)
+        world.timeline.every(GLANCE_PERIOD, self._glance)
         host.begin(self._ask())
 
     def _glance(self) -> None:
@@ -272,13 +272,13 @@ class Session:
             watch, now = monitor.watch, host.now()
             if watch.running is None or now >= min(end, replaced_at):
                 return None
-            await host.sleep(LOOKS)
+            await host.sleep(GLANCE_PERIOD)
 
     async def _cancel(self) -> None:
         monitor = self.world.monitor
         monitor.fail('the target is given up', is_replanned=False, is_fault=False)
         while monitor.watch.is_active(self._host.now()):
-            await self._host.sleep(LOOKS)
+            await self._host.sleep(GLANCE_PERIOD)
 
     def _take_stops(self) -> tuple[Stop, ...]:
         stops = self.world.monitor.watch.stops

@@ -131,7 +131,7 @@ class PlannerNode(Node):
             self._keep_removed,
             self._monitor.check_clock,
         )
-        self.host = NodeHost(self, self._planner)
+        self.host = NodeHost(self, self._planner, self.fail)
         self._queue = PlanQueue(self.host, inputs, self._reporter, publishers, self._monitor)
         # Not the node's clock: simulated time may stand still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -165,7 +165,7 @@ class PlannerNode(Node):
 
     def _keep_removed(self) -> float:
         """Return how long a part of the wearer that is removed now stays where it was [s]."""
-        return 0.0 if self._monitor.running is None else self._reporter.parameters.keep_lost
+        return 0.0 if self._monitor.watch.running is None else self._reporter.parameters.keep_lost
 
     def fail(self, what: str) -> None:
         """Stop an arm in motion after an unexpected error."""

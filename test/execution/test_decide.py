@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The table of what the monitor may be doing after each event, cell by cell."""
 
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import is_dataclass, replace
+import pickle
 import re
 
 from decisions import (
@@ -20,9 +21,11 @@ from decisions import (
 )
 import numpy as np
 import pytest
-from rrth_planner.execution import decide as module, event as events
+from rrth_planner.execution import decide as module, event as events, fail_safe_stop
 from rrth_planner.execution.decide import decide
 from rrth_planner.execution.watch import MonitorState, PendingStop, Watch
+from rrth_planner.model.errors import RequestError
+from same_values import differences
 
 MOTION = turn()
 END = BEGIN + MOTION.duration
@@ -135,7 +138,7 @@ def happening(name, state):
         yield stopped_but_on_the_motion_before()
     if name == 'BodyWaited' and state == 'monitoring':
         watch, motion = monitoring()
-        known = replace(watch.commitments, sent=object())
+        known = replace(watch.commitments, sent='a commitment')
         yield replace(watch, commitments=known), kind(on(motion, WITHIN), 0.08)
 
 
@@ -153,21 +156,16 @@ def test_a_cell_of_the_table_is_what_happens(name, state):
     found = set()
     for watch, event in happening(name, state):
         assert watch.state.value == state
-        before = repr_of(watch)
+        before = pickle.dumps(watch)
         decision = decide(watch, event)
         # The former watch counts where nothing is published.
-        assert repr_of(watch) == before
+        assert not list(differences(pickle.loads(before), watch))
         found.add(decision.watch.state.value)
         is_moving = decision.command is not None and name not in ('Begin', 'BodyCame')
         if is_moving:
             motion = decision.command.motion.trajectory
             assert not motion.velocities[-1].any()
     assert found == table()[name][state]
-
-
-def repr_of(watch):
-    """Return what a watch holds, by identity and value."""
-    return {field.name: getattr(watch, field.name) for field in fields(watch)}
 
 
 def test_a_stop_that_is_not_published_stays_pending_and_is_commanded_again():
@@ -219,3 +217,37 @@ def test_all_that_the_monitor_knows_and_hears_is_frozen():
     for kind in kinds:
         assert is_dataclass(kind)
         assert kind.__dataclass_params__.frozen
+
+
+def test_a_stop_is_commanded_though_what_is_said_of_it_fails(monkeypatch):
+    watch, motion = monitoring()
+    monkeypatch.setattr(fail_safe_stop, 'recorded', lambda *_, **__: 1 / 0)
+    at = on(motion, WITHIN)
+    for event in (
+        events.Fail(at, 'of the test', True, False),
+        events.StopFor(at, 'of the test', hand(MOTION, 1.1), 0.5, WITHIN),
+    ):
+        found = decide(watch, event)
+        assert found.is_stop
+        assert not found.command.motion.trajectory.velocities[-1].any()
+        assert found.watch.state is MonitorState.STOPPING
+        assert 'ZeroDivisionError' in found.lines[-1].text
+
+
+@pytest.mark.parametrize('is_fault', [True, False])
+def test_an_error_at_rest_counts_for_what_is_planned_meanwhile(is_fault):
+    event = events.Fail(moment(LATE, MOTION.positions[-1]), 'of the test', False, is_fault)
+    found = decide(idle(), event).watch
+    assert found.n_faults == is_fault
+    assert found.stop_reason == ('of the test' if is_fault else '')
+    assert found.state is MonitorState.IDLE
+
+
+def test_no_motion_begins_while_a_stop_is_to_be_published():
+    watch, motion = monitoring()
+    at = on(motion, WITHIN)
+    kept = decide(watch, events.Fail(at, 'of the test', True, False)).otherwise.watch
+    planned = replace(motion, start_time=WITHIN)
+    begin = events.Begin(at, planned, GOAL, Rules(), None, None)
+    with pytest.raises(RequestError, match='could not be published: of the test'):
+        decide(kept, begin)

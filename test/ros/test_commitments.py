@@ -264,7 +264,7 @@ def test_what_fails_for_ever_stops_the_arm_beside_a_wearer(separated, monkeypatc
     arm.frames(5, hand)
     # What was published last ends at rest, and nothing follows it.
     trajectory, begin = arm.published[-1]
-    assert not arm.monitor.is_monitoring or arm.monitor.pending_stop
+    assert not arm.monitor.watch.is_monitoring or arm.monitor.watch.pending
     n = len(arm.published)
     arm.frames(60, hand)
     assert len(arm.published) == n
@@ -275,7 +275,7 @@ def test_what_fails_for_ever_stops_the_arm_beside_a_wearer(separated, monkeypatc
 def frames_until_given_up(arm, place, hand):
     """Let the arm rest at a place until its motion is given up; return after how many frames."""
     n = 0
-    while arm.monitor.running is not None:
+    while arm.monitor.watch.running is not None:
         arm.now += FRAME
         arm.read(place, np.zeros(4))
         arm.see(hand)
@@ -300,7 +300,7 @@ def test_a_motion_that_its_controller_rejects_is_given_up_where_the_arm_rests(
     assert ahead > MAX_DEVIATION or not (has_moved and clearance > 0.4)
     for _ in range(MOST_IGNORED - 1):
         assert arm.monitor.take_stops()[-1].is_replanned
-        assert 'does not follow it' in arm.monitor.stop_reason
+        assert 'does not follow it' in arm.monitor.watch.stop_reason
         assert arm.monitor.watch.state is MonitorState.IDLE
         arm.begin()
         if has_moved:
@@ -310,7 +310,7 @@ def test_a_motion_that_its_controller_rejects_is_given_up_where_the_arm_rests(
     assert arm.monitor.take_stops()[-1].is_replanned == has_moved
     assert arm.monitor.watch.state is (MonitorState.IDLE if has_moved else MonitorState.HOLDING)
     arm.begin()
-    assert arm.monitor.running is not None
+    assert arm.monitor.watch.running is not None
 
 
 @pytest.mark.parametrize('hand', [FAR, near(0.3)])
@@ -324,7 +324,7 @@ def test_a_late_arm_whose_driver_has_no_velocities_is_followed(separated, hand):
         arm.read(arm.commanded(max(begin, arm.now - 0.03))[0], np.zeros(4))
         arm.see(hand)
         arm.monitor.check()
-        assert arm.monitor.running is not None
+        assert arm.monitor.watch.running is not None
     assert np.abs(arm.commanded(arm.now)[0] - arm.motion.positions[-1]).max() < 1e-6
 
 
@@ -377,7 +377,7 @@ def test_an_error_moves_the_arm_no_further_than_its_commitment_until_reset(
     assert 'ZeroDivisionError' in arm.monitor.reset()
     arm.see(hand)
     arm.begin()
-    assert arm.monitor.running is not None
+    assert arm.monitor.watch.running is not None
 
 
 def test_after_an_error_during_a_stop_no_motion_begins_until_reset(separated):
@@ -460,7 +460,7 @@ def test_an_arm_that_is_late_by_what_is_stated_is_not_taken_to_ignore_its_motion
         arm.see(FAR)
         arm.monitor.check()
         assert arm.monitor.watch.state is MonitorState.MONITORING
-    assert not arm.monitor.stop_reason
+    assert not arm.monitor.watch.stop_reason
 
 
 def test_a_motion_from_rest_begins_with_the_last_instants_of_what_is_commanded(separated):
@@ -552,7 +552,7 @@ def test_an_arm_off_its_motion_is_stopped_where_no_body_comes(separated):
         arm.now += FRAME
         arm.read(arm.commanded(arm.now)[0] + 0.5, np.ones(4))
         arm.monitor.check()
-    assert 'body_timeout' in arm.monitor.stop_reason
+    assert 'body_timeout' in arm.monitor.watch.stop_reason
     assert len(arm.published) == n + 1
 
 
@@ -644,7 +644,7 @@ def test_a_motion_that_cannot_begin_is_rejected_and_nothing_is_published(separat
 def test_a_held_commitment_is_not_extended_until_then(separated):
     arm, hand = beside(separated, 0.2)
     n = len(arm.published)
-    assert arm.monitor.hold(arm.now + 3.5 * FRAME) is arm.monitor.running
+    assert arm.monitor.hold(arm.now + 3.5 * FRAME) is arm.monitor.watch.running
     arm.frames(3, hand)
     assert len(arm.published) == n
     arm.frames(2, hand)
@@ -878,7 +878,7 @@ def test_the_ray_is_clear_only_while_it_is_known_to_meet_nobody(separated):
     arm.see(FAR, expires=arm.now + 0.01)
     arm.frames(4, sees=False)
     assert not arm.ray_clear[-1]
-    assert arm.monitor.is_monitoring
+    assert arm.monitor.watch.is_monitoring
     arm.frames(2)
     assert arm.ray_clear[-1]
     # Older than `body_timeout`.
@@ -916,7 +916,7 @@ def test_a_hand_in_the_ray_further_on_stops_the_arm_only_where_it_stays(separate
     n = len(arm.published)
     arm.frames(60, hand, other)
     assert 'stopped' in arm.said
-    assert arm.monitor.stop_reason == IN_THE_WAY
+    assert arm.monitor.watch.stop_reason == IN_THE_WAY
     check_ray(arm, n, other)
     arm.frames(100, hand, other)
     assert not arm.commanded(arm.now)[1].any()
@@ -1014,7 +1014,7 @@ def cannot_be_published(arm, hand):
     publish, publishers.publish_motion = publishers.publish_motion, lambda *_: 1 / 0
     arm.frames(5, hand)
     arm.monitor.reset()
-    with pytest.raises(ZeroDivisionError):
+    with pytest.raises(RequestError, match='could not be published'):
         arm.command(ExecutingMotion(trajectory=SWING, start_time=arm.now + AHEAD), joins=None)
     publishers.publish_motion = publish
     arm.frames(20, hand)
@@ -1037,7 +1037,7 @@ FLIGHTS = (
 @pytest.fixture(name='flown', params=FLIGHTS)
 def _flown(request, separated):
     arm, hand = separated(), near(0.3)
-    arm.monitor.flight = FlightRecorder()
+    arm.monitor.flight, arm.n_before = FlightRecorder(), len(arm.published)
     arm.see(hand)
     arm.command(ExecutingMotion(trajectory=SWING, start_time=arm.now + AHEAD), joins=None)
     arm.frames(20, hand)
@@ -1052,15 +1052,13 @@ def test_what_was_decided_is_decided_again_to_the_bit(flown):
     assert all(one.is_same for one in found)
     commands = [one.command for one in found if one.command is not None]
     assert len(commands) >= 5
-    # Of what was published nothing is missing.
-    published = [motion for motion, _ in flown.published]
+    # Of what was published since then nothing is missing, in its order.
     again = [command.motion.trajectory for command in commands]
-    for motion in published[-3:]:
-        assert any(
-            all(np.array_equal(a, b) for a, b in zip(motion.states, other.states, strict=True))
-            for other in again
-            if len(other.times) == len(motion.times)
-        )
+    published = [motion for motion, _ in flown.published[flown.n_before :]]
+    assert len(published) == len(again)
+    for motion, other in zip(published, again, strict=True):
+        assert (motion.times == other.times).all()
+        assert all((a == b).all() for a, b in zip(motion.states, other.states, strict=True))
 
 
 def test_a_replay_says_at_which_event_another_command_is_given(separated):
@@ -1096,3 +1094,19 @@ def test_a_flight_is_replayed_by_a_command(flown, tmp_path, capsys):
     file.write_bytes(file.read_bytes()[:-100])
     assert replay_command.main([str(file)]) == 2
     assert 'flight record: damaged' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(('took', 'is_late'), [(0.0, False), (0.015, True)])
+def test_what_it_takes_to_see_the_wearer_counts_for_a_commitment(separated, clock, took, is_late):
+    arm, hand = beside(separated, 0.3)
+    n, expected_scene = len(arm.published), arm.inputs.expected_scene
+
+    def slow():
+        clock.present += took
+        return expected_scene()
+
+    arm.inputs.expected_scene = slow
+    arm.frames(1, hand)
+    # The arm has gone on meanwhile.
+    assert len(arm.published) == n + (not is_late)
+    assert (arm.monitor.watch.commitments.took > 0.01) == is_late

@@ -313,7 +313,7 @@ def test_after_an_error_while_the_arm_stops_nothing_is_planned_by_itself(monitor
     arm = monitored()
     arm.reporter.parameters = replace(arm.reporter.parameters, replan=True)
     arm.monitor.fail('a body is late')
-    n_stops = arm.monitor.n_stops
+    n_stops = arm.monitor.watch.n_stops
     if is_taken:
         (stop,) = arm.monitor.take_stops()
         assert stop.is_replanned
@@ -323,8 +323,8 @@ def test_after_an_error_while_the_arm_stops_nothing_is_planned_by_itself(monitor
     assert not stop.is_replanned
     assert len(before) == (not is_taken)
     # Nor is a motion published that was planned meanwhile.
-    assert arm.monitor.n_stops > n_stops
-    assert arm.monitor.stop_reason == 'the monitor failed'
+    assert arm.monitor.watch.n_stops > n_stops
+    assert arm.monitor.watch.stop_reason == 'the monitor failed'
     assert len(arm.published) == 1
 
 
@@ -335,7 +335,7 @@ def test_what_is_tried_after_a_stop_is_withdrawn_after_an_error(monitored):
     publishers = SimpleNamespace(is_view_subscribed=lambda: False)
     host = NodeHost(node, SimpleNamespace(close=lambda: None))
     queue = PlanQueue(host, arm.inputs, arm.reporter, publishers, arm.monitor)
-    goal = arm.monitor.goal
+    goal = arm.monitor.watch.goal
     arm.monitor.fail('a body is late')
     queue.follow_up()
     assert queue.pursues(goal)

@@ -144,7 +144,7 @@ def test_a_stop_that_violates_for_the_second_checker_is_kept_to_be_replayed(
     say_all(planner, stranger)
     assert stranger.answer().success
     monitor, parameters = planner._monitor, planner._reporter.parameters
-    stop = fast_stop(monitor.running.trajectory, 0.3, parameters.limits)
+    stop = fast_stop(monitor.watch.running.trajectory, 0.3, parameters.limits)
     scene, goal = scene_of(inputs_of(planner).body.value), inputs_of(planner).target.value
 
     def check(violation):
@@ -159,7 +159,7 @@ def test_a_stop_that_violates_for_the_second_checker_is_kept_to_be_replayed(
         with monkeypatch.context() as patch:
             patch.setattr(trajectory_validation, 'first_violation', lambda *_: violation)
             patch.setattr(planner._planner, 'violation_seen', ask)
-            found = Stop(stop, goal, parameters, scene, False, monitor.n_motions)
+            found = Stop(stop, goal, parameters, scene, False, monitor.watch.n_motions)
             # In the thread that also decides.
             planner.executor.create_task(know, monitor, stops=(found,))
             stranger.wait_until(lambda: asked)

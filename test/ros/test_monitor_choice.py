@@ -94,7 +94,7 @@ def test_an_arm_stops_for_a_part_that_is_about_to_move_into_its_way(monitored, a
     # Further on there is time enough.
     assert monitored.said == (['free'] if ahead > 0.5 else ['stopped'])
     if ahead < 0.5:
-        assert monitored.monitor.stop_reason == SOON_IN_THE_WAY
+        assert monitored.monitor.watch.stop_reason == SOON_IN_THE_WAY
         # It is proven free of the wearer as he is.
         (stop,) = monitored.monitor.take_stops()
         assert stop.scene is not None
@@ -246,11 +246,11 @@ def fail(*_):
 
 
 def test_a_motion_that_could_not_be_published_is_not_monitored(monitored):
-    before = monitored.monitor.running
+    before = monitored.monitor.watch.running
     running = ExecutingMotion(trajectory=_turned(monitored, 0.2), start_time=monitored.now + 0.2)
     with pytest.raises(OSError, match='nothing works'):
         monitored.command(running, fail, PHASE + 0.2)
-    assert monitored.monitor.running is before
+    assert monitored.monitor.watch.running is before
     monitored.see(monitored.hand(0.15, 0.0))
     assert len(monitored.published) == 1
 
@@ -450,7 +450,7 @@ def test_an_arm_off_its_trajectory_is_not_said_to_be_monitored_where_no_body_com
     monitored.run(0.8, lambda after: (monitored.motion.positions[0] + 0.5, np.full(4, 0.2)))
     # A stop is due, and where it would begin is not known.
     assert monitored.published == []
-    assert 'body_timeout' in monitored.monitor.pending_stop
+    assert 'body_timeout' in monitored.monitor.watch.pending.why
     assert 0.1 < max(monitored.alive) - begin < 0.25
 
 

@@ -92,7 +92,7 @@ def stop_for(planner, scene=None):
     still = np.zeros((1, 4))
     over = Trajectory(times=[0.0], positions=[FOLDED], velocities=still, accelerations=still)
     monitor = planner._monitor
-    stop = Stop(over, goal, parameters, scene, True, monitor.n_motions)
+    stop = Stop(over, goal, parameters, scene, True, monitor.watch.n_motions)
     # In the thread that also decides.
     planner.executor.create_task(know, monitor, stops=(*monitor.watch.stops, stop))
 
@@ -147,7 +147,7 @@ def test_a_plan_from_before_a_stop_is_not_published(start, monkeypatch):
     plan_motion = in_process_planner.plan_question
 
     def plan_while_the_arm_is_stopped(*args, **kwargs):
-        know(planner._monitor, n_stops=planner._monitor.n_stops + 1)
+        know(planner._monitor, n_stops=planner._monitor.watch.n_stops + 1)
         return plan_motion(*args, **kwargs)
 
     with monkeypatch.context() as patch:
@@ -169,7 +169,7 @@ def test_a_request_from_before_an_error_moves_no_arm_after_it(start, monkeypatch
         if errors:
             # As `fail` of a motion in progress.
             monitor = planner._monitor
-            known = {'n_stops': monitor.n_stops + 1, 'n_faults': monitor.n_faults + 1}
+            known = {'n_stops': monitor.watch.n_stops + 1, 'n_faults': monitor.watch.n_faults + 1}
             know(monitor, **known, stop_reason=errors.pop())
         return plan_motion(*args, **kwargs)
 
@@ -188,7 +188,7 @@ def test_after_a_stop_it_plans_for_nothing_once_another_motion_has_begun(start, 
     say_all(planner, stranger, joint_states=joints(velocity=[0.0, 0.3, 0.0, 0.0]))
     stop_for(planner)
     stranger.wait_until(lambda: planner._queue._open)
-    know(planner._monitor, n_motions=planner._monitor.n_motions + 1)
+    know(planner._monitor, n_motions=planner._monitor.watch.n_motions + 1)
     stranger.publishers['joint_states'].publish(joints())
     stranger.wait_until(lambda: not planner._queue._open)
     assert planner._reporter.n_requests == 0

@@ -14,7 +14,9 @@ pytest.importorskip('fcl')
 
 from monitored import ARM, FAR, without_separation  # noqa: E402
 from rclpy.node import Node  # noqa: E402
+from rrth_planner.execution.flight_recorder import FlightRecorder  # noqa: E402
 from rrth_planner.execution.joint_reading import JointReading  # noqa: E402
+from rrth_planner.model.errors import RecordError, RequestError  # noqa: E402
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.status import ErrorCode  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
@@ -48,7 +50,7 @@ def _queue():
     monitor = ExecutionMonitor(node, inputs, reporter, publishers)
     host = NodeHost(node, InProcessPlanner())
     queue = PlanQueue(host, inputs, reporter, publishers, monitor)
-    queue.host, queue.reporter = host, reporter
+    queue.host, queue.reporter, queue.monitor = host, reporter, monitor
     yield queue
     queue.close()
     node.destroy_node()
@@ -119,3 +121,54 @@ def test_a_planner_that_hangs_is_answered_for(queue, monkeypatch):
     for outcome in outcomes:
         assert outcome.code is ErrorCode.FAILURE
         assert 'the planner has not answered within 0.1 s' in outcome.sentence
+
+
+def test_a_request_whose_motion_could_not_begin_can_still_be_cancelled(queue, monkeypatch):
+    tries = []
+
+    def cannot_begin(*_):
+        tries.append(queue.pursues(GOAL))
+        assert queue.cancel() == 1
+        raise RequestError(ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE, 'of the test')
+
+    monkeypatch.setattr(ExecutionMonitor, 'begin', cannot_begin)
+    (outcome,) = outcomes_of(queue, [ask(queue, GOAL)])
+    assert outcome.code is ErrorCode.PREEMPTED
+    assert tries == [True]
+    assert not queue.pursues(GOAL)
+
+
+def test_a_flight_record_that_cannot_be_made_costs_no_answer(queue, monkeypatch):
+    monkeypatch.setattr(FlightRecorder, 'to_bytes', lambda _: 1 / 0)
+    monkeypatch.setattr(InProcessPlanner, 'plan', lambda *_: 1 / 0)
+    (outcome,) = outcomes_of(queue, [ask(queue, GOAL)])
+    assert outcome.code is ErrorCode.FAILURE
+    assert 'ZeroDivisionError' in outcome.sentence
+    end = queue.host.future_of(queue.save())
+    with pytest.raises(RecordError, match='no flight record was written: ZeroDivisionError'):
+        outcomes_of(queue, [end])
+
+
+def test_an_error_that_comes_again_and_again_leaves_one_record(queue, monkeypatch, tmp_path):
+    parameters = replace(queue.reporter.parameters, incident_folder=str(tmp_path))
+    queue.reporter.parameters = parameters
+    for _ in range(20):
+        queue.monitor.fail('of the test', is_replanned=False)
+        queue.follow_up()
+        queue.host.go_on()
+        time.sleep(0.01)
+    end = time.monotonic() + 10.0
+    while not list(tmp_path.iterdir()) and time.monotonic() < end:
+        queue.host.go_on()
+        time.sleep(0.01)
+    assert len(list(tmp_path.glob('flight-*.flight'))) == 1
+
+
+def test_a_request_that_is_turned_away_overtakes_nothing(queue):
+    waiting = [ask(queue, GOAL) for _ in range(MOST_WAITING)]
+    n = queue.n_taken
+    refused = ask(queue, GOAL).result()
+    assert refused.number == MOST_WAITING + 1
+    assert queue.n_taken == n == MOST_WAITING
+    queue.cancel()
+    outcomes_of(queue, waiting)

@@ -5,11 +5,15 @@
 from collections.abc import Callable
 from queue import SimpleQueue
 from threading import Thread
+import traceback
+
+# What hangs, as a file on a disk that is gone, is not waited for any longer [s].
+LONGEST_END = 2.0
 
 
 class WorkThread:
     """
-    Does what it is given, in turn; that raises nothing.
+    Does what it is given, in turn; what that raises is written to standard error.
 
     A `ThreadPoolExecutor` of one thread takes three times as long to hand something over.
     """
@@ -26,11 +30,14 @@ class WorkThread:
         self._work.put(work)
 
     def close(self) -> None:
-        """Return once it has done what it is doing; it does nothing more."""
+        """Have it do nothing more; return once it has done what it is doing, or soon."""
         self._is_closed = True
         self.put(lambda: None)
-        self._thread.join()
+        self._thread.join(LONGEST_END)
 
     def _run(self) -> None:
         while not self._is_closed:
-            self._work.get()()
+            try:
+                self._work.get()()
+            except Exception:
+                traceback.print_exc()

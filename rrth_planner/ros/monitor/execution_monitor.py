@@ -9,6 +9,7 @@ It fails closed: any error ends in a fail-safe stop by what was known before it.
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 import math
 from threading import RLock
 import time
@@ -52,12 +53,12 @@ from rrth_planner.ros.interface.parameters import NEVER, PlannerParameters
 from rrth_planner.ros.interface.publishers import PlanPublishers
 from rrth_planner.ros.interface.reporter import Reporter
 from rrth_planner.ros.messages.body import scene_of, WearerBody
+from rrth_planner.ros.messages.fields import NANOSECONDS
 
 # Period of the checks of the inputs and of the commanded motion [s].
 CHECK_PERIOD = 0.02
 # Clocks are read at once where that takes no longer [s].
 AT_ONCE = 1e-3
-NANOSECONDS = 1e-9
 
 
 class ExecutionMonitor:
@@ -132,7 +133,7 @@ class ExecutionMonitor:
             self._run_fail_safe(lambda: self._report(before, decision, 0.0))
             with suppress(Exception):
                 if not self._watch.is_doubted and not self._publishers.has_listener():
-                    self._take(NobodyListens(event.at))
+                    self._take(NobodyListens)
 
     def on_body(self, body: WearerBody, arrived: int, is_newest: bool = True) -> None:
         """
@@ -140,18 +141,21 @@ class ExecutionMonitor:
 
         Of bodies that came together the newest is checked; all of them say how fast parts are.
         """
+        sights: list[Sight] = []
 
-        def check() -> None:
-            self._check_clock()
-            at, sight = self._moment(), None
+        def came(at: Moment) -> BodyCame:
             if body is not self._seen and at.rules.separation is not None:
                 parts = (*body.parts, *body.lost)
                 measured = np.array([part.measured for _, part in parts for _ in part.boxes])
-                sight = Sight(scene_of(body), measured)
+                sights.append(Sight(scene_of(body), measured))
             look = self._look(body, at) if is_newest else None
-            self._take(BodyCame(at, sight, look), arrived)
-            self._seen = None if at.rules.separation is None else body
-            if sight is not None and self._watch.commitments.body is not None:
+            return BodyCame(at, sights[0] if sights else None, look)
+
+        def check() -> None:
+            self._check_clock()
+            self._take(came, arrived)
+            self._seen = None if self._reporter.parameters.separation is None else body
+            if sights and self._watch.commitments.body is not None:
                 with suppress(Exception):
                     self._reporter.body_observed(self._watch.commitments.body)
 
@@ -186,16 +190,14 @@ class ExecutionMonitor:
         A handover is planned from it; also the last motion after its end, since the controller
         holds that. Without separation it is the whole motion anyway. None: it is not known.
         """
-        with self._lock:
-            self._take(Hold(self._moment(), until))
-            return self._watch.tracked.command
+        self._run_fail_safe(lambda: self._take(lambda at: Hold(at, until)))
+        return self._watch.tracked.command
 
     def take_stops(self) -> list[Stop]:
         """Return the stops published since the last call."""
-        with self._lock:
-            stops = list(self._watch.stops)
-            if stops:
-                self._take(StopsTaken(self._moment()))
+        stops = list(self._watch.stops)
+        if stops:
+            self._run_fail_safe(lambda: self._take(StopsTaken))
         return stops
 
     def reset(self) -> str:
@@ -204,15 +206,13 @@ class ExecutionMonitor:
 
         A motion that waits for that goes on: also one that was stopped and is planned anew.
         """
-        with self._lock:
-            fault = self._watch.commitments.fault
-            self._take(Reset(self._moment()))
-            return fault
+        fault = self._watch.commitments.fault
+        self._run_fail_safe(lambda: self._take(Reset))
+        return fault
 
     def report_hold(self, why: str) -> None:
         """Report that the arm stays where it came to rest."""
-        with self._lock:
-            self._take(Rest(self._moment(), why))
+        self._run_fail_safe(lambda: self._take(lambda at: Rest(at, why)))
 
     def close(self) -> None:
         """Stop the arm, which is no longer monitored, and end monitoring."""
@@ -230,49 +230,9 @@ class ExecutionMonitor:
         return any(stop.goal is goal and stop.is_replanned for stop in self._watch.stops)
 
     @property
-    def running(self) -> ExecutingMotion | None:
-        """The motion that the arm executes, as far as known."""
-        return self._watch.running
-
-    @property
     def executes_whole(self) -> bool:
         """Whether the arm executes a motion that was published as a whole, or the stop of one."""
-        return self.running is not None and self._watch.rules.separation is None
-
-    @property
-    def n_stops(self) -> int:
-        return self._watch.n_stops
-
-    @property
-    def n_motions(self) -> int:
-        return self._watch.n_motions
-
-    @property
-    def n_faults(self) -> int:
-        return self._watch.n_faults
-
-    @property
-    def stop_reason(self) -> str:
-        return self._watch.stop_reason
-
-    @property
-    def pending_stop(self) -> str:
-        return '' if self._watch.pending is None else self._watch.pending.why
-
-    @property
-    def goal(self) -> PointingGoal | None:
-        return self._watch.goal
-
-    @property
-    def is_monitoring(self) -> bool:
-        return self._watch.is_monitoring
-
-    @property
-    def has_arrived(self) -> bool:
-        return self._watch.has_arrived
-
-    def is_active(self, now: float) -> bool:
-        return self._watch.is_active(now)
+        return self._watch.running is not None and self._watch.rules.separation is None
 
     def _run_fail_safe(self, check: Callable[[], None]) -> None:
         """Run a check; an error in it ends in a stop."""
@@ -287,15 +247,21 @@ class ExecutionMonitor:
                     self._node.get_logger().error(''.join(traceback.format_exception(problem)))
 
     def _take(
-        self, event: Event, arrived: int | None = None, published: float | None = None
+        self,
+        happens: Callable[[Moment], Event],
+        arrived: int | None = None,
+        published: float | None = None,
+        moment: Callable[[], Moment] | None = None,
     ) -> None:
         """
-        Take an event: publish what is decided, keep it, report it, and decide what is next.
+        Take what happens: publish what is decided, keep it, report it, and decide what is next.
 
         arrived: when the body came that it is about [ns]; published: how long after its cause the
-        stop was that it is about [s].
+        stop was that it is about [s]; moment: returns when it happens, by default now.
         """
+        # What it takes to see what is known counts, too: a commitment begins by that time.
         begun, before, fate = time.perf_counter(), self._watch, Fate.NONE
+        event = happens(self._moment() if moment is None else moment())
         command: Command | None = None
         try:
             decision = decide(before, event)
@@ -312,16 +278,16 @@ class ExecutionMonitor:
         else:
             self._report(before, decision, took if published is None else published)
         if command is not None and command.within < math.inf:
-            self._take(CommitmentTook(event.at, took))
+            self._take(lambda at: CommitmentTook(at, took), moment=lambda: event.at)
         if decision.next is not None:
-            self._take(replace(decision.next, at=self._moment()), arrived, published)
+            self._take(partial(_at, decision.next), arrived, published)
         if decision.is_look_due:
-            at = self._moment()
-            self._take(BodyCame(at, None, self._look(self._inputs.body.value, at)))
+            body = self._inputs.body.value
+            self._take(lambda at: BodyCame(at, None, self._look(body, at)))
         if decision.age is not None and arrived is not None:
             waited = self._elapsed(arrived)
             if waited > LONGEST_WAIT:
-                self._take(BodyWaited(self._moment(), waited))
+                self._take(lambda at: BodyWaited(at, waited))
 
     def _remember(self, watch: Watch, event: Event, fate: Fate, command: Command | None) -> None:
         # What cannot be recorded is decided all the same.
@@ -357,7 +323,7 @@ class ExecutionMonitor:
         event = Fail(self._moment_of_failure(), why, is_replanned, is_fault)
         before = self._watch
         try:
-            self._take(event)
+            self._take(lambda _: event, moment=lambda: event.at)
         except Exception:
             if self._watch is before:
                 self._watch = pending(before, event)
@@ -414,7 +380,7 @@ class ExecutionMonitor:
 
     def _check_periodically(self) -> None:
         self._check_clock()
-        self._take(Tick(self._moment()))
+        self._take(Tick)
         if self._watch.pending is None:
             self._publishers.assert_liveliness()
         if self._reporter.parameters.separates != NEVER:
@@ -422,7 +388,7 @@ class ExecutionMonitor:
 
     def _check_clock(self) -> None:
         before = time.monotonic()
-        now = self._node.get_clock().now().nanoseconds * NANOSECONDS
+        now = self._node.get_clock().now().nanoseconds / NANOSECONDS
         after = time.monotonic()
         if after - before > AT_ONCE:
             return
@@ -432,11 +398,13 @@ class ExecutionMonitor:
         if found is not None:
             # How old things are does not change by a step.
             self._inputs.shift(found.step)
-            self._take(ClockStepped(self._moment(), found.step, found.sentence))
+            step, sentence = found.step, found.sentence
+            self._take(lambda at: ClockStepped(at, step, sentence))
 
     def _moment(self) -> Moment:
         """Return the present, with what is known now."""
-        now, rules, overdue = self._now(), self._reporter.parameters, ''
+        now, steady = self._now(), time.monotonic()
+        rules, overdue = self._reporter.parameters, ''
         if self._watch.running is not None:
             try:
                 self._inputs.require_fresh(now, rules)
@@ -444,7 +412,7 @@ class ExecutionMonitor:
                 overdue = str(problem)
         return Moment(
             now=now,
-            steady=time.monotonic(),
+            steady=steady,
             reading=self._inputs.joints.value,
             rules=rules,
             overdue=overdue,
@@ -482,10 +450,15 @@ class ExecutionMonitor:
 
     def _elapsed(self, arrived: int) -> float:
         """Return the time since the arrival of a body [ns -> s]."""
-        return NANOSECONDS * (time.time_ns() - arrived)
+        return (time.time_ns() - arrived) / NANOSECONDS
 
     def _now(self) -> float:
-        return self._node.get_clock().now().nanoseconds * NANOSECONDS
+        return self._node.get_clock().now().nanoseconds / NANOSECONDS
+
+
+def _at(event: Event, at: Moment) -> Event:
+    """Return an event as it happens at a moment."""
+    return replace(event, at=at)
 
 
 def _error_line() -> Line:

@@ -20,6 +20,9 @@ from rrth_planner.pipeline.host import Host
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.ros.interface.parameters import PlannerParameters
 
+# A folder keeps so many flight records, of up to some 20 MB each.
+MOST_FLIGHTS = 10
+
 
 class PlanError(RrthError):
     """An unexpected error, its cause, with the question that led to it."""
@@ -55,9 +58,11 @@ def keep_flight(flight: FlightRecorder, folder: str) -> Path:
     """Write the last events of the monitor to a file; raise RecordError where that fails."""
     time = datetime.now(timezone.utc).isoformat(timespec='microseconds')
     try:
-        return write_record(flight.to_bytes(), incident_folder(folder), 'flight', time, '.flight')
-    except OSError as problem:
-        raise RecordError(f'no flight record was written: {problem}') from problem
+        content, where = flight.to_bytes(), incident_folder(folder)
+        return write_record(content, where, 'flight', time, '.flight', MOST_FLIGHTS)
+    except Exception as problem:
+        what = f'{type(problem).__name__}: {problem}'
+        raise RecordError(f'no flight record was written: {what}') from problem
 
 
 def incident_of(problem: BaseException) -> Incident | None:

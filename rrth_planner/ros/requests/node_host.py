@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where the requests of a node run: its own thread, its clock, its planning process."""
 
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Iterator
 from contextlib import suppress
 from functools import partial
 import math
+from threading import Event
 import time
 import traceback
 from typing import Any, TypeVar
@@ -16,7 +17,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 from rrth_planner.collision.violation import Violation
 from rrth_planner.execution.coroutines import Coroutines, Wait
-from rrth_planner.model.errors import RequestError
+from rrth_planner.model.errors import one_line, RequestError
 from rrth_planner.model.status import ErrorCode
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.planning_process import (
@@ -51,12 +52,16 @@ class NodeHost:
     ----------
     planner : Planner
         Closed with this.
+    on_error : callable
+        Takes what went wrong where messages are processed for a request.
 
     """
 
-    def __init__(self, node: Node, planner: Planner) -> None:
+    def __init__(
+        self, node: Node, planner: Planner, on_error: Callable[[str], None] = lambda what: None
+    ) -> None:
         """Begin with nothing to do."""
-        self._node, self._planner = node, planner
+        self._node, self._planner, self._on_error = node, planner, on_error
         self._guard = node.create_guard_condition(self.go_on)
         self._coroutines = Coroutines(time.monotonic, self._wake)
         # Not the node's clock: simulated time may stand still.
@@ -111,8 +116,14 @@ class NodeHost:
 
     async def plan(self, question: PlanQuestion, should_stop: Callable[[], bool]) -> MotionPlan:
         """Do what `Planner.plan` does."""
-        longest = question.options.time_limit + LONGEST_ANSWER
-        plan: MotionPlan = await self._ask(longest, self._planner.plan, question, should_stop)
+        longest, is_over = question.options.time_limit + LONGEST_ANSWER, Event()
+        try:
+            plan: MotionPlan = await self._ask(
+                longest, self._planner.plan, question, lambda: is_over.is_set() or should_stop()
+            )
+        finally:
+            # One that was given up does not keep the next one waiting.
+            is_over.set()
         return plan
 
     async def violation_seen(self, *arguments: Any) -> Violation | None:
@@ -141,7 +152,7 @@ class NodeHost:
             # Callbacks that are called by hand have processed all messages.
             return
         begin = paused = self.steady()
-        for _ in process_backlog(self._node):
+        for _ in self._processed():
             if self.steady() < paused + SLICE:
                 continue
             if self.steady() > begin + LONGEST_READING:
@@ -152,6 +163,16 @@ class NodeHost:
                 )
             await self.sleep(0.0)
             paused = self.steady()
+
+    def _processed(self) -> Iterator[None]:
+        """Process the messages that have come; an error in that is one of the node."""
+        try:
+            yield from process_backlog(self._node)
+        except Exception as problem:
+            self.error(traceback.format_exc())
+            what = one_line(f'{type(problem).__name__}: {problem}')
+            self._on_error(f'a message could not be processed, {what}')
+            raise RequestError(ErrorCode.FAILURE, f'an error of the node: {what}') from problem
 
     def error(self, sentence: str) -> None:
         """Log an error."""
@@ -188,9 +209,15 @@ class NodeHost:
         self._n_asked += 1
         problem = PlanningProcessError(f'the planner has not answered within {longest:g} s')
         left = self._answered - present
-        wait = self._given_to(self._asking, left, problem, work, *arguments)
-        wait.then(self._on_answer)
-        return wait
+
+        def answered() -> Any:
+            try:
+                return work(*arguments)
+            finally:
+                # Then it is the turn of the next one, whether anybody still waits for this or not.
+                self._coroutines.post(self._on_answer)
+
+        return self._given_to(self._asking, left, problem, answered)
 
     def _on_answer(self) -> None:
         self._n_asked -= 1

@@ -149,7 +149,7 @@ class PointHeadServer:
 
     def _stop(self, pursuit: _Pursuit) -> None:
         """Plan no more for a goal, and stop an arm that executes its motion."""
-        if self._monitor.goal is pursuit.goal and self._monitor.is_monitoring:
+        if self._monitor.watch.goal is pursuit.goal and self._monitor.watch.is_monitoring:
             self._monitor.brake(CANCELLED)
         self._queue.withdraw(pursuit.goal)
 
@@ -181,7 +181,7 @@ class PointHeadServer:
         if pursuit.commanded is None or self._queue.pursues(goal):
             return None
         is_cancelled = pursuit.handle.is_cancel_requested
-        if monitor.goal is not goal:
+        if monitor.watch.goal is not goal:
             return ErrorCode.PREEMPTED, CANCELLED if is_cancelled else REPLACED
         now = self._node.get_clock().now().nanoseconds * 1e-9
         rest_speed = self._reporter.parameters.rest_speed
@@ -191,9 +191,9 @@ class PointHeadServer:
             # At rest the mean counts: encoders are noisy.
             arm = self._reporter.parameters.arm
             angle = pointing_angle(arm, reading.mean_positions(rest_speed), goal.target)
-        if monitor.is_active(now):
+        if monitor.watch.is_active(now):
             is_early = time.monotonic() - pursuit.commanded < EARLIEST
-            if is_early or is_cancelled or not monitor.is_monitoring:
+            if is_early or is_cancelled or not monitor.watch.is_monitoring:
                 return None
             return _arrival(angle)
         if is_cancelled:

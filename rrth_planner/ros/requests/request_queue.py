@@ -12,6 +12,7 @@ from typing import cast
 from rrth_planner.execution.command import ahead
 from rrth_planner.execution.coroutines import Wait
 from rrth_planner.execution.executing_motion import ExecutingMotion
+from rrth_planner.execution.flight_recorder import MEMORY
 from rrth_planner.execution.joint_reading import JointReading
 from rrth_planner.execution.remaining_motion import is_place_free
 from rrth_planner.execution.watch import Stop
@@ -145,26 +146,35 @@ class PlanQueue:
         self._is_closed = False
         # So far, and how many of them are not answered yet.
         self._n_requests, self._n_waiting = 0, 0
-        # Of the monitor, when its events were last written for that.
-        self._n_faults = 0
+        # Those that were turned away, too: the number of the last answer.
+        self._n_asked = 0
+        # Of the monitor, when its events were last written for that, and since when they may be
+        # again [s].
+        self._n_faults, self._may_save = 0, -math.inf
         # The number of the request whose goal the arm pursues; None: of none.
         self._pursued: int | None = None
         # The goal that was given up last after a stop, and why.
         self._given_up: tuple[PointingGoal | None, ErrorCode, str] = None, *CANCELLED
+
+    @property
+    def n_taken(self) -> int:
+        """How many requests were planned for, or wait for their turn."""
+        return self._n_requests
 
     async def respond(self, goal: PointingGoal | None) -> Outcome:
         """Return the outcome of a request for a goal, or for the last target, after its turn."""
         begin = self._host.steady()
         # What it finds is compared by the clock of its own time.
         self._monitor.check_clock()
-        self._n_requests += 1
-        ticket = _Ticket(goal, self._n_requests)
+        self._n_asked += 1
+        ticket = _Ticket(goal, self._n_asked)
         if self._n_waiting >= MOST_WAITING:
             sentence = f'{MOST_WAITING} requests wait for their answers already: ask again later'
             self._host.warning(sentence, WARNING_PERIOD)
             return self._answered(Outcome(ErrorCode.PREEMPTED, sentence), ticket)
         self._open.add(ticket)
         self._n_waiting += 1
+        self._n_requests += 1
         try:
             async with self._own_turn():
                 outcome = await self._work(ticket, begin)
@@ -279,10 +289,10 @@ class PlanQueue:
         """
         longest = parameters.options.time_limit if patience is None else patience
         monitor, end = self._monitor, self._host.steady() + longest
-        n_faults = monitor.n_faults
+        n_faults = monitor.watch.n_faults
         await self._await_clear_ray(parameters, ticket)
         while True:
-            n_stops = monitor.n_stops
+            n_stops = monitor.watch.n_stops
 
             async def publish(
                 outcome: Outcome, revalidation: Revalidation, n_stops: int = n_stops
@@ -292,10 +302,10 @@ class PlanQueue:
                 msg = self._publishers.motion(outcome.trajectory, revalidation.parameters, 0.0)
                 await self._host.read()
                 # From here on nothing is awaited: no message comes in between.
-                if monitor.n_faults != n_faults:
+                if monitor.watch.n_faults != n_faults:
                     raise RequestError(
                         ErrorCode.FAILURE,
-                        f'an error while the motion was planned: {monitor.stop_reason}',
+                        f'an error while the motion was planned: {monitor.watch.stop_reason}',
                     )
                 return self._publish(ticket, outcome, revalidation, n_stops, msg)
 
@@ -383,15 +393,10 @@ class PlanQueue:
         monitor, parameters = self._monitor, revalidation.parameters
         require_not_cancelled(lambda: ticket.is_cancelled)
         self._require_same_source(parameters)
-        if n_stops != monitor.n_stops:
+        if n_stops != monitor.watch.n_stops:
             raise RequestError(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
-                f'the arm was stopped while its motion was planned: {monitor.stop_reason}',
-            )
-        if monitor.pending_stop:
-            raise RequestError(
-                ErrorCode.FAILURE,
-                f'a stop of the arm could not be published: {monitor.pending_stop}',
+                f'the arm was stopped while its motion was planned: {monitor.watch.stop_reason}',
             )
         revalidation.require_fit()
         if revalidation.is_late():
@@ -400,8 +405,6 @@ class PlanQueue:
         assert trajectory is not None and plan is not None and snapshot is not None
         now = self._host.now()
         self._reporter.body_used(self._inputs.body.age(now))
-        # From here on the request cannot be cancelled.
-        self._open.discard(ticket)
         handover, start = outcome.handover, now + ahead(parameters.controller_delay)
         planned = ExecutingMotion(
             trajectory=trajectory,
@@ -419,10 +422,12 @@ class PlanQueue:
             math.inf if handover is None else handover.joins,
             None if handover is None else handover.before,
         )
+        # From here on the request cannot be cancelled.
+        self._open.discard(ticket)
         self._pursued, self._given_up = ticket.request, (None, *CANCELLED)
         self._reporter.pursued(ticket.request)
         # As a whole it is published with what leads to it.
-        whole = monitor.running if parameters.separation is None else None
+        whole = monitor.watch.running if parameters.separation is None else None
         published = planned if whole is None else whole
         return replace(outcome, stamp=stamp_of(published.start_time))
 
@@ -430,9 +435,7 @@ class PlanQueue:
         """Report and show what was planned; check stops a second time, and plan again."""
         self._report()
         self._show_newest()
-        if self._monitor.n_faults != self._n_faults:
-            self._n_faults = self._monitor.n_faults
-            self._host.begin(self._save_fault())
+        self._save_if_failed()
         if not self._monitor.executes_whole:
             self._publishers.withdraw_whole()
         now, present = self._host.now(), self._host.steady()
@@ -474,27 +477,27 @@ class PlanQueue:
 
     def _give_up(self, resumption: _Resumption, code: ErrorCode, sentence: str) -> None:
         """Keep why the goal of a stopped motion is given up, unless another motion has begun."""
-        if resumption.n_motions == self._monitor.n_motions:
+        if resumption.n_motions == self._monitor.watch.n_motions:
             self._given_up = resumption.goal, code, sentence
 
     def _note_end(self) -> None:
         """Report a goal that is not pursued any more before the arm has arrived."""
-        monitor, goal = self._monitor, self._monitor.goal
-        if goal is None or monitor.is_monitoring or self.pursues(goal):
+        monitor, goal = self._monitor, self._monitor.watch.goal
+        if goal is None or monitor.watch.is_monitoring or self.pursues(goal):
             return
         if self._pursued is not None:
             self._pursued = None
-            if not monitor.has_arrived:
+            if not monitor.watch.has_arrived:
                 why = self.why_given_up(goal)
-                stopped = self._reporter.monitor_state[1] or monitor.stop_reason
+                stopped = self._reporter.monitor_state[1] or monitor.watch.stop_reason
                 self._reporter.given_up(stopped if why is None else answer(*why))
-        if monitor.running is None:
+        if monitor.watch.running is None:
             self._reporter.nothing_runs()
 
     def _is_overtaken(self, resumption: _Resumption) -> bool:
         """Return whether one was commanded since its stop, or requested since its first try."""
         is_requested = resumption.n_requests != self._n_requests and not resumption.is_first
-        return is_requested or resumption.n_motions != self._monitor.n_motions
+        return is_requested or resumption.n_motions != self._monitor.watch.n_motions
 
     def _discard_resumption(self) -> None:
         if self._resumption is not None:
@@ -503,8 +506,14 @@ class PlanQueue:
 
     async def _resume(self, resumption: _Resumption) -> None:
         """Plan again for the goal of a motion that was stopped."""
-        async with self._own_turn():
-            await self._try_again(resumption)
+        try:
+            async with self._own_turn():
+                await self._try_again(resumption)
+        except Exception as problem:
+            # Nobody waits for it any more.
+            self._open.discard(resumption.ticket)
+            self._give_up(resumption, ErrorCode.FAILURE, sentence_of(problem))
+            raise
 
     async def _try_again(self, resumption: _Resumption) -> None:
         ticket = resumption.ticket
@@ -555,13 +564,25 @@ class PlanQueue:
         except TimeoutError as problem:
             raise RecordError(f'no flight record was written: {problem}') from problem
 
+    def _save_if_failed(self) -> None:
+        """Have them written once after an error, when the arm rests, which needs the machine."""
+        monitor, present = self._monitor, self._host.steady()
+        if (
+            monitor.watch.n_faults != self._n_faults
+            and not monitor.watch.is_active(self._host.now())
+            and present >= self._may_save
+        ):
+            # An error that comes again and again is in the same record.
+            self._n_faults, self._may_save = monitor.watch.n_faults, present + MEMORY
+            self._host.begin(self._save_fault())
+
     async def _save_fault(self) -> None:
         """Have them written since something failed."""
         try:
             what = f'what led to it is in {await self.save()}'
         except RecordError as problem:
             what = str(problem)
-        self._host.error(f'{self._monitor.stop_reason}: {what}')
+        self._host.error(f'{self._monitor.watch.stop_reason}: {what}')
 
     async def _keep(self, incident: Incident, folder: str) -> str:
         """Have an incident written to a file; return what to add to the answer."""
