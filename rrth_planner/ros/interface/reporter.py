@@ -173,7 +173,7 @@ class Reporter:
     def given_up(self, why: str) -> None:
         """Publish that the goal of that request is not pursued any more."""
         self._given_up = one_line(why)
-        self._node.get_logger().warning(f'goal of request {self._request} given up: {why}')
+        self._node.get_logger().warning(f'goal of answer {self._request} given up: {why}')
         self._publish()
 
     def nothing_runs(self) -> None:
