@@ -20,7 +20,8 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.rotation import quaternion_xyzw
 from rrth_planner.model.scene import Scene
-from rrth_planner.ros.messages.answer import Answer, answer_from_msg, answer_from_text
+from rrth_planner.requests.answer import Answer
+from rrth_planner.ros.messages.answer import answer_from_msg, answer_from_text
 from rrth_planner.ros.middleware.child_process import ChildProcess
 from rrth_planner.ros.middleware.qos import ANSWERED
 from sensor_msgs.msg import JointState

@@ -28,13 +28,16 @@ from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.separation import Separation, SeparationRules
+from rrth_planner.model.stamp import NANOSECONDS
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.pipeline.host import BlockingHost, completed
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.request import PlanQuestion
+from rrth_planner.requests.outcome import Outcome
+from rrth_planner.requests.plan_request import plan_request
+from rrth_planner.requests.revalidation import Revalidation
 from rrth_planner.ros.interface.inputs import Inputs
-from rrth_planner.ros.interface.outcome import Outcome
 from rrth_planner.ros.interface.parameters import (
     declared,
     parameters_from_values,
@@ -44,12 +47,9 @@ from rrth_planner.ros.interface.publishers import PlanPublishers
 from rrth_planner.ros.interface.reporter import Reporter
 from rrth_planner.ros.messages.body import WearerBody
 from rrth_planner.ros.messages.controller_points import controller_points_from_msg
-from rrth_planner.ros.messages.fields import NANOSECONDS
 from rrth_planner.ros.messages.marker_edits import BodyPart
 from rrth_planner.ros.messages.trajectory import joint_trajectory_to_msg
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor
-from rrth_planner.ros.requests.plan_request import plan_request
-from rrth_planner.ros.requests.revalidation import Revalidation
 from rrth_planner.simulation.lagging_arm import LaggingArm
 from rrth_planner.simulation.trajectory_controller import (
     Command,

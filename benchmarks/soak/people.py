@@ -17,8 +17,9 @@ from rrth_planner.io.arm_file import load_arm
 from rrth_planner.kernels.layout import ROTATION, SIZE
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.scene import Scene
+from rrth_planner.model.stamp import NANOSECONDS
 from rrth_planner.ros.messages.body import scene_of, WearerBody
-from rrth_planner.ros.messages.fields import NANOSECONDS, nanoseconds_of
+from rrth_planner.ros.messages.fields import nanoseconds_of
 from rrth_planner.ros.middleware.child_process import ChildProcess
 from tqdm import tqdm
 from visualization_msgs.msg import MarkerArray

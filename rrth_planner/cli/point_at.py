@@ -22,13 +22,13 @@ from rrth_planner.io.extras import require
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.errors import MessageError, OptionsError, RrthError
 from rrth_planner.model.status import ErrorCode
+from rrth_planner.requests.answer import Answer
 from rrth_planner.ros.client.planner_client import (
     NotInTimeError,
     parameters_of_planner,
     PlannerClient,
 )
 from rrth_planner.ros.interface.parameters import PlannerParameters
-from rrth_planner.ros.messages.answer import Answer
 from rrth_planner.ros.messages.body_writer import body_from_file
 from rrth_planner.ros.messages.frames import Frames
 from rrth_planner.ros.messages.goal import goal_from_msg

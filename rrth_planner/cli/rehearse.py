@@ -79,7 +79,7 @@ def lines_of(found: 'Rehearsal') -> list[str]:
     for one in found.pursuits:
         if one.outcome:
             what = f'{one.took:8.2f}  {one.slowest:10.2f}  {one.n_plans:5}  {one.n_stops:5}'
-            why = '' if one.outcome == 'aimed' else f': {one.sentence}'
+            why = f': {one.sentence}' if one.sentence else ''
             lines.append(f'  {one.asked - BEGIN:9.2f}  {what}  {one.outcome}{why}')
     lost = sorted(found.lost.items(), key=lambda item: -item[1])
     causes = [

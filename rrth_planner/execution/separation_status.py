@@ -5,6 +5,12 @@
 from dataclasses import dataclass
 from enum import Enum
 
+# What a motion beside a body that stands still comes without, and how to have it.
+NO_PROMISE = (
+    'nothing is promised of a wearer who moves, since his body came as one that stands still: '
+    'publish bodies as a stream, stamped, at 30 Hz or more'
+)
+
 
 class SeparationState(Enum):
     """How the running motion is executed; the names are those of `~/state`."""

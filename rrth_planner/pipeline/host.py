@@ -3,6 +3,7 @@
 """What a request awaits while it runs: time, and a planner."""
 
 from collections.abc import Callable, Coroutine
+import secrets
 import time
 from typing import Any, Protocol, TypeVar
 
@@ -22,6 +23,9 @@ class Host(Protocol):
 
     def steady(self) -> float:
         """Return a time that goes on whatever happens to that clock [s]."""
+
+    def new_seed(self) -> int:
+        """Return a seed for a plan that was given none."""
 
     async def sleep(self, seconds: float) -> None:
         """Return after a time [s]."""
@@ -81,6 +85,10 @@ class BlockingHost:
         self.now, self.steady = clock, steady
         self._planner, self._sleep = planner, sleep
 
+    def new_seed(self) -> int:
+        """Return one that nobody knows."""
+        return random_seed()
+
     async def sleep(self, seconds: float) -> None:
         """Return after a time [s]."""
         self._sleep(seconds)
@@ -92,6 +100,11 @@ class BlockingHost:
     async def violation_seen(self, *arguments: Any) -> Violation | None:
         """Do what `Planner.violation_seen` does."""
         return self._planner.violation_seen(*arguments)
+
+
+def random_seed() -> int:
+    """Return a seed that nobody knows."""
+    return secrets.randbelow(2**31)
 
 
 def completed(coroutine: Coroutine[Any, Any, T]) -> T:

@@ -2,13 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """A rehearsal: a scenario in virtual time, and what was seen of it."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields
 from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
 from rrth_planner.execution.commitments import ExecutionRules
-from rrth_planner.execution.watch import PlainRules
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.motion_capture_file import load_person
 from rrth_planner.io.settings import load_settings
@@ -18,6 +17,7 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.separation import Separation, SeparationRules
 from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner
+from rrth_planner.rehearsal.parameters import RehearsedParameters
 from rrth_planner.rehearsal.rehearsed_wearer import (
     HAND_PERIOD,
     Hidden,
@@ -38,11 +38,11 @@ from rrth_planner.rehearsal.witness import Testimony, Witness
 from rrth_planner.rehearsal.world import BEGIN, Wire, World
 from rrth_planner.simulation.trajectory_controller import ControllerRules, ControllerVersion
 
-# A plan has as long as it needs: what a clock ends differs from run to run [s].
-UNLIMITED = 3600.0
 # Where the arm begins [rad].
 FOLDED = (0.0, -0.35, 0.5 * np.pi, 0.5 * np.pi)
 REST_SPEED = 0.01
+# As the planner node has them by default [rad], [s].
+START_TOLERANCE, BODY_TIMEOUT, JOINT_TIMEOUT, PATIENCE = 0.002, 0.2, 0.2, 5.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,8 +91,6 @@ def rehearsed(scenario: Scenario, is_drawn: bool = False) -> Rehearsal:
     """
     arm = load_arm()
     settings = load_settings(arm.dof)
-    # The second checker is not asked: it finds faults of the planner, not of what is rehearsed.
-    planned = replace(settings, options=replace(settings.options, time_limit=UNLIMITED))
     proof, execution, tracker = scenario.separation, scenario.controller, scenario.tracker
     stop_limits = MotionLimits(
         velocity=settings.limits.velocity,
@@ -106,16 +104,20 @@ def rehearsed(scenario: Scenario, is_drawn: bool = False) -> Rehearsal:
         limits=settings.limits,
         stop_limits=stop_limits,
     )
-    rules = PlainRules(
+    parameters = RehearsedParameters(
+        **{field.name: getattr(settings, field.name) for field in fields(settings)},
         arm=arm,
-        margin=settings.margin,
-        ray_guard_length=settings.ray_guard_length,
         stop_limits=stop_limits,
         execution=ExecutionRules(separation, execution.delay, REST_SPEED, False),
+        body_timeout=BODY_TIMEOUT,
+        joint_timeout=JOINT_TIMEOUT,
+        keep_lost=tracker.keep_lost,
+        patience=PATIENCE,
+        start_tolerance=START_TOLERANCE,
     )
     person = _person(scenario)
     world = World(
-        rules,
+        parameters,
         Hidden(person, [(loss.part, loss.begin, loss.end) for loss in tracker.loses]),
         np.array(FOLDED),
         scenario.seed,
@@ -125,6 +127,8 @@ def rehearsed(scenario: Scenario, is_drawn: bool = False) -> Rehearsal:
             loss=tracker.loss,
             transport=execution.transport,
             deciding=scenario.node.deciding,
+            body_timeout=BODY_TIMEOUT,
+            joint_timeout=JOINT_TIMEOUT,
             keep_lost=tracker.keep_lost,
         ),
         controller=ControllerRules(version=ControllerVersion(execution.version)),
@@ -141,13 +145,15 @@ def rehearsed(scenario: Scenario, is_drawn: bool = False) -> Rehearsal:
 
         world.timeline.every(HAND_PERIOD, look)
     # Latencies of their own: what is asked for is the same whatever becomes of it.
-    latencies = np.random.default_rng((scenario.seed, 1))
+    latencies, seeds = (np.random.default_rng((scenario.seed, k)) for k in (1, 2))
     host = VirtualHost(
         world.timeline,
         InProcessPlanner(),
         lambda: float(latencies.uniform(*scenario.planner.latency)),
         lambda: is_within(world.timeline.now - BEGIN, scenario.planner.dead),
-        settings.options.time_limit,
+        lambda: world.stands_until,
+        world.read,
+        lambda: int(seeds.integers(2**31)),
     )
     for begin, end in scenario.node.stands_still:
         world.timeline.at(BEGIN + begin, partial(world.stand_still, BEGIN + end))
@@ -162,11 +168,10 @@ def rehearsed(scenario: Scenario, is_drawn: bool = False) -> Rehearsal:
     session = Session(
         world,
         host,
-        planned,
+        parameters,
         SessionRules(pause=wanted.pause, gives_up=wanted.gives_up, replaced=wanted.replaced),
         draw,
         scenario.seed,
-        settings.options.time_limit,
     )
     world.timeline.run(BEGIN + scenario.seconds)
     monitor = world.monitor

@@ -2,34 +2,25 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where requests run in virtual time: they await times, and a planner whose answers take time."""
 
-from collections.abc import Callable, Coroutine, Generator
-from typing import Any, Protocol
+from collections.abc import Callable, Coroutine
+from dataclasses import replace
+import math
+from typing import Any, TypeVar
 
-from rrth_planner.model.errors import RequestError
-from rrth_planner.model.status import ErrorCode
+from rrth_planner.collision.violation import Violation
+from rrth_planner.execution.coroutines import Coroutines
 from rrth_planner.pipeline.motion_plan import MotionPlan
+from rrth_planner.pipeline.planning_process import Planner, PlanningProcessError
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.rehearsal.timeline import Timeline
 
+T = TypeVar('T')
 # A planner that has not answered so long after its time limit is replaced [s].
 GRACE = 5.0
-
-
-class AnsweringPlanner(Protocol):
-    """What answers questions."""
-
-    def plan(self, question: PlanQuestion) -> MotionPlan:
-        """Return the answer."""
-
-
-class _Sleep:
-    """Awaited, it lets a time pass [s]."""
-
-    def __init__(self, seconds: float) -> None:
-        self.seconds = seconds
-
-    def __await__(self) -> Generator[float, None, None]:
-        yield self.seconds
+# A plan has as long as it needs: what a clock ends differs from run to run [s].
+UNLIMITED = 3600.0
+# The second checker answers after so long [s].
+CHECKING = 0.002
 
 
 class VirtualHost:
@@ -42,22 +33,35 @@ class VirtualHost:
         Returns how long the next answer takes [s].
     is_dead : callable
         Whether the planner gives no answers now.
-    time_limit : float
-        Of a plan [s]: a request whose answer does not come GRACE after it fails.
+    stands_until : callable
+        Returns until when the host does nothing [s]; then it reads what has come first.
+    read : callable
+        Has the messages processed that have come.
+    new_seed : callable
+        Returns the seed of a plan that was given none.
 
     """
 
     def __init__(
         self,
         timeline: Timeline,
-        planner: AnsweringPlanner,
+        planner: Planner,
         latency: Callable[[], float],
         is_dead: Callable[[], bool] = lambda: False,
-        time_limit: float = 4.0,
+        stands_until: Callable[[], float] = lambda: -math.inf,
+        read: Callable[[], None] = lambda: None,
+        new_seed: Callable[[], int] = lambda: 0,
     ) -> None:
         """Begin with no coroutine."""
         self._timeline, self._planner = timeline, planner
-        self._latency, self._is_dead, self._time_limit = latency, is_dead, time_limit
+        self._latency, self._is_dead = latency, is_dead
+        self._stands_until, self._read, self._new_seed = stands_until, read, new_seed
+        self._coroutines = Coroutines(self.now, self._wake)
+        # When they are gone on with next [s].
+        self._due = math.inf
+        self.n_plans = 0
+        # What was logged.
+        self.lines: list[str] = []
 
     def now(self) -> float:
         """Return the time that messages are stamped with [s]."""
@@ -67,9 +71,13 @@ class VirtualHost:
         """Return a time that is never set [s]."""
         return self._timeline.now
 
+    def new_seed(self) -> int:
+        """Return the next seed."""
+        return self._new_seed()
+
     async def sleep(self, seconds: float) -> None:
         """Return after a time [s]."""
-        await _Sleep(seconds)
+        await self._coroutines.sleep(seconds)
 
     async def plan(
         self, question: PlanQuestion, should_stop: Callable[[], bool] = lambda: False
@@ -77,22 +85,77 @@ class VirtualHost:
         """
         Return the answer to a question, once it has come.
 
-        Raise RequestError where none comes in time.
+        Raise PlanningProcessError where none comes in time.
         """
+        self.n_plans += 1
+        limit = question.options.time_limit
         if self._is_dead():
-            longest = self._time_limit + GRACE
+            longest = limit + GRACE
             await self.sleep(longest)
-            raise RequestError(
-                ErrorCode.FAILURE, f'the planner has not answered within {longest:g} s'
-            )
-        plan = self._planner.plan(question)
+            raise PlanningProcessError(f'the planner has not answered within {longest:g} s')
+        unlimited = replace(question.options, time_limit=UNLIMITED)
+        plan = self._planner.plan(replace(question, options=unlimited), should_stop)
         await self.sleep(self._latency())
         return plan
 
+    async def violation_seen(self, *arguments: Any) -> Violation | None:
+        """Do what `Planner.violation_seen` does."""
+        violation = self._planner.violation_seen(*arguments)
+        await self.sleep(CHECKING)
+        return violation
+
     def begin(self, coroutine: Coroutine[Any, Any, object]) -> None:
-        """Have a coroutine run from now on."""
-        try:
-            seconds = coroutine.send(None)
-        except StopIteration:
+        """Have a coroutine run from now on; an error in it ends the rehearsal."""
+        end = self._coroutines.start(coroutine)
+
+        def fail_with_it() -> None:
+            end.result()
+
+        end.then(fail_with_it)
+        self._look_ahead()
+
+    async def help(self, work: Callable[..., T], *arguments: Any) -> T:
+        """Raise TimeoutError: a rehearsal writes no files, and shows nothing."""
+        raise TimeoutError('a rehearsal writes no files')
+
+    async def read(self) -> None:
+        """Return once the messages that have come are processed."""
+        self._read()
+
+    def error(self, sentence: str) -> None:
+        """Keep an error."""
+        self.lines.append(sentence)
+
+    def warning(self, sentence: str, period: float) -> None:
+        """Keep a warning."""
+        self.lines.append(sentence)
+
+    def close(self) -> None:
+        """Do nothing."""
+
+    def _wake(self) -> None:
+        self._go_on_at(self._timeline.now)
+
+    def _look_ahead(self) -> None:
+        left = self._coroutines.time_left()
+        if left < math.inf:
+            self._go_on_at(self._timeline.now + left)
+
+    def _go_on_at(self, time: float) -> None:
+        """Go on with what is due at a time [s], unless that is done earlier anyway."""
+        if time < self._due:
+            self._due = time
+            self._timeline.at(time, self._go_on)
+
+    def _go_on(self) -> None:
+        now = self._timeline.now
+        if now < self._due:
+            # Something was due earlier, and after that this is.
             return
-        self._timeline.after(seconds, lambda: self.begin(coroutine))
+        self._due = math.inf
+        if now < self._stands_until():
+            self._go_on_at(self._stands_until())
+            return
+        self._read()
+        self._coroutines.run()
+        self._look_ahead()

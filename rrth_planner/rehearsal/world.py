@@ -7,7 +7,6 @@ What goes wrong on a real wire is drawn with a seed: frames that are late or los
 take their time, a host that stands still, a middleware that fails, a controller that rejects.
 """
 
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 import math
@@ -16,8 +15,8 @@ from typing import Protocol
 import numpy as np
 from rrth_planner.execution.decision import Command
 from rrth_planner.execution.event import BodyCame, Event, Look, Moment, Sight, Tick
-from rrth_planner.execution.expected_wearer import expected_scene
 from rrth_planner.execution.joint_reading import JointReading, with_earlier
+from rrth_planner.execution.recent_wearer import RecentWearer
 from rrth_planner.execution.watch import MonitorRules
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Box, Scene
@@ -34,10 +33,6 @@ from rrth_planner.simulation.trajectory_controller import (
 
 # Periods of joint states and of the monitor's checks [s].
 JOINT_PERIOD, CHECK_PERIOD = 0.01, 0.02
-# Where parts will be follows from two sights that are so far apart [s].
-STEADY, LATELY = 0.08, 0.25
-# A tracker's noise [m].
-MOVED = 0.01
 # A host that has other things to do decides so much later [s].
 HESITATION = 0.04
 # Virtual time begins then [s]: stamps are positive.
@@ -144,7 +139,7 @@ class World:
         self._parts: dict[str, tuple[Box, float]] = {}
         # How long the last decision took [s].
         self.took = 0.0
-        self._sights: deque[tuple[float, Scene]] = deque(maxlen=64)
+        self._recent: RecentWearer[Scene] = RecentWearer(lambda scene: scene)
         self._last_arrival = -math.inf
         # What the controller was given last.
         self.arrived: Command | None = None
@@ -215,12 +210,7 @@ class World:
     @property
     def is_wearer_moving(self) -> bool:
         """Whether a part of him has moved lately by more than a tracker's noise."""
-        since = self.timeline.now - LATELY
-        scenes = [scene for came, scene in self._sights if came >= since]
-        if len(scenes) < 2:
-            return False
-        now, before = scenes[-1].numbers, scenes[0].numbers
-        return now.shape != before.shape or bool(np.abs(now - before).max() > MOVED)
+        return self._recent.is_moving(self.timeline.now)
 
     @property
     def reading(self) -> JointReading | None:
@@ -233,14 +223,7 @@ class World:
 
     def expected(self) -> Scene:
         """Return where moving parts of the wearer will be soon."""
-        now = self.timeline.now
-        if not self._sights or now - self._sights[-1][0] > LATELY:
-            return Scene(())
-        came, present = self._sights[-1]
-        for then, before in reversed(self._sights):
-            if STEADY <= came - then <= LATELY:
-                return expected_scene(before, present, came - then)
-        return Scene(())
+        return self._recent.expected(self.timeline.now)
 
     def _cycle(self) -> None:
         arm, controller = self.arm, self.arm.controller
@@ -260,7 +243,7 @@ class World:
 
     def _check(self) -> None:
         if not self.is_still:
-            self._take_waiting()
+            self.read()
             self.monitor.take(Tick(self.moment()))
 
     def _frame(self) -> None:
@@ -288,13 +271,13 @@ class World:
     def _body_came(self, seen: tuple[Box, ...], measured: float) -> None:
         self._waiting.append((self.timeline.now, seen, measured))
         if not self.is_still:
-            self._take_waiting()
+            self.read()
 
     def is_new(self, measured: float) -> bool:
         """Return whether a body was measured [s] after all that came before it."""
         return measured > self._measured
 
-    def _take_waiting(self) -> None:
+    def read(self) -> None:
         """Have all bodies seen that came, and the newest one checked."""
         waiting, self._waiting = self._waiting, []
         for k, (came, seen, measured) in enumerate(waiting):
@@ -305,7 +288,7 @@ class World:
             self._parts.update((box.name, (box, measured)) for box in seen)
             self._scene = Scene(tuple(box for box, _ in self._parts.values()))
             self._measured = measured
-            self._sights.append((self.timeline.now, self._scene))
+            self._recent.saw(self._scene, self.timeline.now)
             sight = Sight(self._scene, np.array([then for _, then in self._parts.values()]))
             look = self.look() if k == len(waiting) - 1 else None
             self.monitor.take(BodyCame(self.moment(), sight, look), self.timeline.now - came)

@@ -11,11 +11,11 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.time import Time
 from rrth_planner.model.errors import MessageError, SceneError
+from rrth_planner.model.stamp import NANOSECONDS
 from rrth_planner.ros.interface.posture_inputs import create_input, PersonInput
 from rrth_planner.ros.interface.tracker_parameters import declare_tracker_parameters
 from rrth_planner.ros.interface.tracker_reporter import because, TrackerReporter
 from rrth_planner.ros.messages.body_source import TRACKER
-from rrth_planner.ros.messages.fields import NANOSECONDS
 from rrth_planner.ros.messages.other_persons import OtherPersons
 from rrth_planner.ros.messages.part_markers import PartMarkers
 from rrth_planner.ros.messages.posture import TrackedPosture

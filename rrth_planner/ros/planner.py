@@ -18,8 +18,9 @@ from rclpy.signals import SignalHandlerOptions
 from rrth_planner.model.errors import MessageError, RrthError
 from rrth_planner.model.status import ErrorCode
 from rrth_planner.pipeline.worker_process import WorkerProcess
+from rrth_planner.requests.answer import answer
 from rrth_planner.ros.interface.parameters import declare_parameters, PlannerParameters
-from rrth_planner.ros.messages.error_codes import answer, code_of_rejection
+from rrth_planner.ros.messages.error_codes import code_of_rejection
 from rrth_planner.ros.middleware.answers import Answers
 from rrth_planner.ros.middleware.executor import settle_interpreter, spin
 from rrth_planner.ros.middleware.qos import SERVICE
@@ -30,7 +31,7 @@ from std_srvs.srv import Trigger
 if TYPE_CHECKING:
     from rrth_planner.model.goal import PointingGoal
     from rrth_planner.pipeline.planning_process import Planner
-    from rrth_planner.ros.interface.outcome import Outcome
+    from rrth_planner.requests.outcome import Outcome
     from rrth_planner.ros.requests.point_head import PointHeadServer
 
 NAME = 'rrth_planner'
@@ -107,18 +108,20 @@ class PlannerNode(Node):
 
     def _create_components(self, parameters: PlannerParameters) -> None:
         """Create inputs, monitor and queue."""
+        from rrth_planner.requests.request_queue import PERIOD, PlanQueue
         from rrth_planner.ros.interface.inputs import Inputs
         from rrth_planner.ros.interface.publishers import PlanPublishers
         from rrth_planner.ros.interface.reporter import Reporter
         from rrth_planner.ros.interface.scene_monitor import SceneMonitor
         from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor
         from rrth_planner.ros.requests.node_host import NodeHost
-        from rrth_planner.ros.requests.request_queue import PERIOD, PlanQueue
 
         self._inputs = inputs = Inputs(
             *(self.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))
         )
-        self._motions = publishers = PlanPublishers(self, parameters.separates)
+        self._motions = publishers = PlanPublishers(
+            self, parameters.separates, parameters.base_frame
+        )
         self._reporter = Reporter(self, inputs, parameters)
         self._monitor = ExecutionMonitor(self, inputs, self._reporter, publishers)
         self._scene_monitor = SceneMonitor(

@@ -23,12 +23,13 @@ from rrth_planner.execution.playback import accept, Playback, standing, stop
 from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import MessageError, RrthError
+from rrth_planner.model.stamp import NANOSECONDS
 from rrth_planner.ros.interface.playback_parameters import (
     declare_playback_parameters,
     initial_positions,
     playback_rules,
 )
-from rrth_planner.ros.messages.fields import NANOSECONDS, seconds_of
+from rrth_planner.ros.messages.fields import seconds_of
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg, pose_to_msg
 from rrth_planner.ros.middleware.node_process import run_node
 from rrth_planner.ros.middleware.open_subscription import decoded

@@ -20,6 +20,7 @@ from rclpy.qos import QoSProfile
 from rclpy.time import Time
 from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.errors import MessageError, SceneError
+from rrth_planner.model.stamp import NANOSECONDS
 from rrth_planner.ros.interface.simulation_parameters import (
     declare_simulation_parameters,
     simulated_arm,
@@ -28,7 +29,7 @@ from rrth_planner.ros.interface.simulation_parameters import (
 from rrth_planner.ros.messages.contacts import contacts_to_msg
 from rrth_planner.ros.messages.controller_points import controller_points_from_msg
 from rrth_planner.ros.messages.diagnostics import status_to_msg
-from rrth_planner.ros.messages.fields import NANOSECONDS, seconds_of
+from rrth_planner.ros.messages.fields import seconds_of
 from rrth_planner.ros.messages.part_markers import PartMarkers
 from rrth_planner.ros.messages.tracked_person import LIFETIME
 from rrth_planner.ros.middleware.node_process import run_node

@@ -29,12 +29,14 @@ MAY = {
     'wearer': 'model',
     'io': 'model collision planning pipeline wearer',
     'simulation': 'model wearer io',
-    'rehearsal': 'kernels model collision timing execution pipeline wearer io simulation',
+    'requests': 'model collision planning execution pipeline io',
+    'rehearsal': 'kernels model collision timing execution pipeline wearer io requests simulation',
     'visualization': 'model collision planning execution pipeline wearer io',
-    'ros': 'kernels model collision planning timing execution pipeline wearer io simulation',
+    'ros': 'kernels model collision planning timing execution pipeline wearer io requests '
+    'simulation',
     'reproduction': 'kernels model collision planning io visualization',
-    'cli': 'kernels model collision planning timing execution pipeline wearer io visualization '
-    'simulation rehearsal ros reproduction',
+    'cli': 'kernels model collision planning timing execution pipeline wearer io requests '
+    'visualization simulation rehearsal ros reproduction',
 }
 # Within `ros`, each package imports only itself and those before it.
 ROS_ROOMS = ('messages', 'middleware', 'interface', 'monitor', 'requests', 'client')

@@ -8,6 +8,7 @@ from pathlib import Path
 import re
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,9 +19,10 @@ from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.settings import load_settings
 from rrth_planner.io.wearer_file import load_body
-from rrth_planner.model.errors import OptionsError, RequestError
+from rrth_planner.model.errors import OptionsError
 from rrth_planner.model.scene import Box
 from rrth_planner.model.separation import Separation, SeparationRules
+from rrth_planner.pipeline.planning_process import PlanningProcessError
 from rrth_planner.rehearsal.contacts import FAST
 from rrth_planner.rehearsal.rehearsal import rehearsed
 from rrth_planner.rehearsal.rehearsed_wearer import Hidden, InterceptingWearer
@@ -119,14 +121,15 @@ def test_what_a_tracker_loses_is_still_there():
 
 def test_coroutines_await_virtual_time():
     timeline, seen = Timeline(5.0), []
-    host = VirtualHost(timeline, None, lambda: 0.01, lambda: True, 4.0)
+    host = VirtualHost(timeline, None, lambda: 0.01, lambda: True)
+    question = SimpleNamespace(options=SimpleNamespace(time_limit=4.0))
 
     async def ask():
         await host.sleep(2.0)
         seen.append(host.now())
         try:
-            await host.plan(None)
-        except RequestError as problem:
+            await host.plan(question)
+        except PlanningProcessError as problem:
             seen.append((host.now(), str(problem)))
 
     host.begin(ask())
@@ -215,10 +218,10 @@ def test_the_page_says_the_values_that_a_scenario_does_not_give(tmp_path):
 def test_the_command_prints_what_became_of_each_target_and_draws_it(tmp_path, capsys):
     pytest.importorskip('matplotlib')
     picture = tmp_path / 'course.png'
-    given = ['intercepting_hand', '--seconds', '9', '--seed', '4', '--plot', str(picture)]
+    given = ['intercepting_hand', '--seconds', '9', '--seed', '6', '--plot', str(picture)]
     assert main(given) == 0
     text = capsys.readouterr().out
-    assert rehearsed(scenario_of('intercepting_hand', seconds=9.0, seed=4)).digest in text
+    assert rehearsed(scenario_of('intercepting_hand', seconds=9.0, seed=6)).digest in text
     assert 'aimed' in text
     assert picture.stat().st_size > 10_000
 

@@ -15,7 +15,7 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
-from rrth_planner.ros.interface.outcome import Outcome  # noqa: E402
+from rrth_planner.requests.outcome import Outcome  # noqa: E402
 from rrth_planner.ros.planner import PlannerNode  # noqa: E402
 from samples import joints, target, wearer  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402

@@ -25,6 +25,7 @@ from rrth_planner.execution import (  # noqa: E402
 from rrth_planner.execution.commitments import Commitments  # noqa: E402
 from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
+from rrth_planner.requests.request_queue import PlanQueue  # noqa: E402
 from rrth_planner.ros.interface.inputs import Input, Inputs  # noqa: E402
 from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
 from rrth_planner.ros.middleware.qos import LEASE  # noqa: E402
@@ -32,7 +33,6 @@ from rrth_planner.ros.monitor import execution_monitor  # noqa: E402
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor  # noqa: E402
 from rrth_planner.ros.planner import PlannerNode  # noqa: E402
 from rrth_planner.ros.requests.node_host import NodeHost  # noqa: E402
-from rrth_planner.ros.requests.request_queue import PlanQueue  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
 PACKAGE = str(Path(rrth_planner.__file__).parent)

@@ -28,12 +28,12 @@ from rrth_planner.model.status import (
     PlanStatus,  # noqa: E402
 )
 from rrth_planner.planning.options import RRTStarOptions  # noqa: E402
+from rrth_planner.requests import incidents, plan_request  # noqa: E402
+from rrth_planner.requests.answer import CODE_OF_STATUS  # noqa: E402
+from rrth_planner.requests.outcome import Outcome  # noqa: E402
 from rrth_planner.ros.interface import reporter  # noqa: E402
 from rrth_planner.ros.interface.inputs import Inputs  # noqa: E402
-from rrth_planner.ros.interface.outcome import Outcome  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of, WearerBody  # noqa: E402
-from rrth_planner.ros.messages.error_codes import CODE_OF_STATUS  # noqa: E402
-from rrth_planner.ros.requests import incidents, plan_request  # noqa: E402
 from rrth_planner.timing.fast_stop import fast_stop  # noqa: E402
 import samples  # noqa: E402
 from stranger import _start, inputs_of, say_all  # noqa: E402, F401

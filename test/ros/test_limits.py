@@ -31,11 +31,12 @@ from rrth_planner.model.errors import (  # noqa: E402
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.scene import Scene  # noqa: E402
 from rrth_planner.model.status import ErrorCode  # noqa: E402
-from rrth_planner.ros.interface.inputs import Input, InputSnapshot  # noqa: E402
+from rrth_planner.requests.answer import answer  # noqa: E402
+from rrth_planner.requests.inputs import InputSnapshot  # noqa: E402
+from rrth_planner.ros.interface.inputs import Input  # noqa: E402
 from rrth_planner.ros.messages import body as body_module  # noqa: E402
 from rrth_planner.ros.messages.answer import answer_from_text  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of, WearerBody  # noqa: E402
-from rrth_planner.ros.messages.error_codes import answer  # noqa: E402
 from rrth_planner.ros.messages.goal import goal_from_msg
 from rrth_planner.ros.messages.joint_state import joint_reading
 from rrth_planner.ros.messages.marker_edits import (  # noqa: E402

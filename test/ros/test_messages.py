@@ -18,16 +18,12 @@ from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.model.arm import bars_of, mount_bars, tool_pose  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
 from rrth_planner.model.rotation import pose_matrix, rotation_matrix  # noqa: E402
-from rrth_planner.model.status import PlanStatus  # noqa: E402
+from rrth_planner.model.status import ErrorCode, PlanStatus  # noqa: E402
 from rrth_planner.model.trajectory import Trajectory  # noqa: E402
+from rrth_planner.requests.answer import answer, CODE_OF_STATUS  # noqa: E402
 from rrth_planner.ros.messages import body as bodies, marker_edits  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of, WearerBody
-from rrth_planner.ros.messages.error_codes import (  # noqa: E402
-    answer,
-    code_of_rejection,
-    CODE_OF_STATUS,
-    ErrorCode,
-)
+from rrth_planner.ros.messages.error_codes import code_of_rejection  # noqa: E402
 from rrth_planner.ros.messages.frames import FrameError
 from rrth_planner.ros.messages.goal import goal_from_msg
 from rrth_planner.ros.messages.joint_state import configuration_from_msg, has_joint_of

@@ -4,7 +4,6 @@
 
 from dataclasses import replace
 import re
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,8 +20,6 @@ from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E40
 from rrth_planner.execution.watch import MonitorState  # noqa: E402
 from rrth_planner.model.scene import Box, Scene  # noqa: E402
 from rrth_planner.model.trajectory import MotionLimits, sample, Trajectory  # noqa: E402
-from rrth_planner.ros.interface import inputs as inputs_module  # noqa: E402
-from rrth_planner.ros.interface.inputs import Inputs  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of, WearerBody  # noqa: E402
 from rrth_planner.ros.messages.marker_edits import BodyPart  # noqa: E402
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor  # noqa: E402
@@ -42,48 +39,6 @@ def test_a_free_motion_continues(monitored):
     monitored.see(FAR)
     assert monitored.published == []
     assert monitored.said == ['free']
-
-
-def test_parts_are_expected_where_they_will_be_by_their_last_bodies(monkeypatch):
-    inputs, clock = Inputs('body', 'target', 'joints'), SimpleNamespace(now=50.0)
-    monkeypatch.setattr(
-        inputs_module, 'time', SimpleNamespace(monotonic=lambda: clock.now), raising=True
-    )
-
-    def see(place):
-        hand = Box('hand', [-3.0, place, 0.0], [0.1, 0.1, 0.1], np.eye(3))
-        parts = tuple(((box.name, 0), BodyPart((box,), float('inf'))) for box in (hand, FAR))
-        inputs.body.value = WearerBody(parts)
-        inputs.body_came()
-
-    assert not inputs.expected_scene().boxes
-    for k in range(10):
-        clock.now = 50.0 + 0.025 * k
-        see(1.5 * 0.025 * k)
-        # Two bodies right after each other do not give a speed.
-        assert bool(inputs.expected_scene().boxes) == (k >= 4)
-    found = inputs.expected_scene().boxes
-    assert [box.name for box in found] == ['hand'] * 3
-    place = 1.5 * 0.225
-    steps = [box.center[1] - place for box in found]
-    np.testing.assert_allclose(steps, (0.15, 0.3, 0.45), rtol=1e-6)
-    # Where it is by now nobody knows.
-    clock.now += 0.3
-    assert not inputs.expected_scene().boxes
-
-
-@pytest.mark.parametrize('rate', [120, 240, 1000, 3000])
-def test_parts_are_expected_however_often_bodies_come(monkeypatch, rate):
-    inputs, clock = Inputs('body', 'target', 'joints'), SimpleNamespace(now=50.0)
-    monkeypatch.setattr(inputs_module, 'time', SimpleNamespace(monotonic=lambda: clock.now))
-    for k in range(rate // 2):
-        clock.now = 50.0 + k / rate
-        hand = Box('hand', [-3.0, 1.5 * k / rate, 0.0], [0.1, 0.1, 0.1], np.eye(3))
-        inputs.body.value = WearerBody(((('hand', 0), BodyPart((hand,), float('inf'))),))
-        inputs.body_came()
-    steps = [box.center[1] - hand.center[1] for box in inputs.expected_scene().boxes]
-    np.testing.assert_allclose(steps, (0.15, 0.3, 0.45), rtol=1e-6)
-    assert inputs.is_wearer_moving()
 
 
 @pytest.mark.parametrize('ahead', [0.1, 0.2, 0.7])

@@ -22,11 +22,12 @@ from rrth_planner.model.status import ErrorCode  # noqa: E402
 from rrth_planner.model.trajectory import REST_SPEED, sample, Trajectory  # noqa: E402
 from rrth_planner.pipeline.host import BlockingHost, completed  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
-from rrth_planner.ros.interface.inputs import Input, Inputs, InputSnapshot  # noqa: E402
+from rrth_planner.requests.inputs import InputSnapshot  # noqa: E402
+from rrth_planner.requests.plan_request import plan_request  # noqa: E402
+from rrth_planner.requests.revalidation import Revalidation  # noqa: E402
+from rrth_planner.ros.interface.inputs import Input, Inputs  # noqa: E402
 from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
 from rrth_planner.ros.messages.marker_edits import BodyPart  # noqa: E402
-from rrth_planner.ros.requests.plan_request import plan_request  # noqa: E402
-from rrth_planner.ros.requests.revalidation import Revalidation  # noqa: E402
 from rrth_planner.timing.fast_stop import fast_stop  # noqa: E402
 import worlds  # noqa: E402
 

@@ -26,9 +26,10 @@ from rrth_planner.model.arm import pointing_error  # noqa: E402
 from rrth_planner.model.status import ErrorCode  # noqa: E402
 from rrth_planner.pipeline import in_process_planner  # noqa: E402
 from rrth_planner.pipeline.planning_process import PlanningProcessError  # noqa: E402
+from rrth_planner.requests.outcome import Outcome  # noqa: E402
+from rrth_planner.requests.revalidation import Revalidation  # noqa: E402
 from rrth_planner.ros import planner as planner_module  # noqa: E402
 from rrth_planner.ros.client import planner_client  # noqa: E402
-from rrth_planner.ros.interface.outcome import Outcome  # noqa: E402
 from rrth_planner.ros.interface.parameters import RULES  # noqa: E402
 from rrth_planner.ros.messages.answer import answer_from_msg, answer_from_text  # noqa: E402
 from rrth_planner.ros.messages.fields import (
@@ -36,7 +37,6 @@ from rrth_planner.ros.messages.fields import (
     seconds_of,  # noqa: E402
 )
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg  # noqa: E402
-from rrth_planner.ros.requests.revalidation import Revalidation  # noqa: E402
 from samples import array, box, command, fenced, FOLDED, JOINTS, joints, target, wearer  # noqa: E402
 from stranger import _start, inputs_of, NAN, say_all, Stranger, TOPICS  # noqa: E402, F401
 from visualization_msgs.msg import Marker  # noqa: E402

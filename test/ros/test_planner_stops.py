@@ -20,8 +20,8 @@ from rrth_planner.model.scene import Scene  # noqa: E402
 from rrth_planner.model.status import ErrorCode  # noqa: E402
 from rrth_planner.model.trajectory import Trajectory  # noqa: E402
 from rrth_planner.pipeline import in_process_planner  # noqa: E402
-from rrth_planner.ros.interface.outcome import Outcome  # noqa: E402
-from rrth_planner.ros.requests import request_queue  # noqa: E402
+from rrth_planner.requests import request_queue  # noqa: E402
+from rrth_planner.requests.outcome import Outcome  # noqa: E402
 from samples import fenced, FOLDED, joints  # noqa: E402
 from stranger import _one_try, _start, inputs_of, say_all  # noqa: E402, F401
 

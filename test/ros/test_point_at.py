@@ -34,11 +34,11 @@ from rrth_planner.model.arm import pointing_error  # noqa: E402
 from rrth_planner.model.errors import MessageError, RrthError  # noqa: E402
 from rrth_planner.model.status import ErrorCode  # noqa: E402
 from rrth_planner.model.trajectory import Trajectory  # noqa: E402
+from rrth_planner.requests.answer import Answer  # noqa: E402
 from rrth_planner.ros.client import dry_run  # noqa: E402
 from rrth_planner.ros.client.follow_motion import follow  # noqa: E402
 from rrth_planner.ros.client.planner_client import NotInTimeError, PlannerClient  # noqa: E402
 from rrth_planner.ros.messages.answer import (  # noqa: E402
-    Answer,
     answer_from_msg,
     answer_from_text,
     answer_to_msg,

@@ -20,6 +20,7 @@ from rrth_planner.model.errors import RecordError, RequestError  # noqa: E402
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.status import ErrorCode  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
+from rrth_planner.requests.request_queue import MOST_WAITING, PlanQueue  # noqa: E402
 from rrth_planner.ros.interface.inputs import Inputs  # noqa: E402
 from rrth_planner.ros.interface.parameters import NEVER  # noqa: E402
 from rrth_planner.ros.interface.publishers import PlanPublishers  # noqa: E402
@@ -28,7 +29,6 @@ from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
 from rrth_planner.ros.messages.marker_edits import BodyPart  # noqa: E402
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor  # noqa: E402
 from rrth_planner.ros.requests.node_host import NodeHost  # noqa: E402
-from rrth_planner.ros.requests.request_queue import MOST_WAITING, PlanQueue  # noqa: E402
 import worlds  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
@@ -46,7 +46,7 @@ def _queue():
         np.array(worlds.FOLDED), np.zeros(ARM.dof), now, now, float('inf')
     )
     inputs.body.measured = inputs.joints.measured = now
-    publishers, reporter = PlanPublishers(node, NEVER), Reporter(node, inputs, parameters)
+    publishers, reporter = PlanPublishers(node, NEVER, 'torso'), Reporter(node, inputs, parameters)
     monitor = ExecutionMonitor(node, inputs, reporter, publishers)
     host = NodeHost(node, InProcessPlanner())
     queue = PlanQueue(host, inputs, reporter, publishers, monitor)

@@ -8,16 +8,16 @@ from rrth_planner.model.errors import MessageError
 from rrth_planner.model.status import ErrorCode
 from rrth_planner.pipeline.host import BlockingHost, completed
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner
+from rrth_planner.requests.answer import Answer
+from rrth_planner.requests.outcome import Outcome
+from rrth_planner.requests.plan_request import plan_request
+from rrth_planner.requests.revalidation import Revalidation
 from rrth_planner.ros.client.planner_client import PlannerClient
 from rrth_planner.ros.interface.inputs import Inputs
-from rrth_planner.ros.interface.outcome import Outcome
 from rrth_planner.ros.interface.parameters import in_effect, PlannerParameters
 from rrth_planner.ros.interface.scene_monitor import SceneMonitor
-from rrth_planner.ros.messages.answer import Answer
 from rrth_planner.ros.messages.body import WearerBody
 from rrth_planner.ros.messages.error_codes import code_of_rejection
-from rrth_planner.ros.requests.plan_request import plan_request
-from rrth_planner.ros.requests.revalidation import Revalidation
 from visualization_msgs.msg import MarkerArray
 
 

@@ -8,8 +8,8 @@ import numpy as np
 from rrth_planner.model.arm import ArmModel, pointing_error
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.trajectory import positions_at, Trajectory
+from rrth_planner.requests.answer import Answer
 from rrth_planner.ros.client.planner_client import motions_of, NotInTimeError, PlannerClient
-from rrth_planner.ros.messages.answer import Answer
 from rrth_planner.ros.messages.joint_state import gaps_between
 from tqdm import tqdm  # type: ignore[import-untyped]
 

@@ -30,13 +30,14 @@ from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import MessageError, one_line, RrthError
 from rrth_planner.model.status import ErrorCode
 from rrth_planner.model.trajectory import Trajectory
+from rrth_planner.requests.answer import Answer
 from rrth_planner.ros.interface.parameters import (
     declared,
     parameters_from_values,
     PlannerParameters,
 )
 from rrth_planner.ros.interface.separation_status import separation_from_msg
-from rrth_planner.ros.messages.answer import Answer, answer_from_msg, answer_from_text
+from rrth_planner.ros.messages.answer import answer_from_msg, answer_from_text
 from rrth_planner.ros.messages.diagnostics import GIVEN_UP_KEY, REQUEST_KEY
 from rrth_planner.ros.messages.fields import nanoseconds_of
 from rrth_planner.ros.messages.joint_state import (

@@ -13,10 +13,11 @@ from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import MessageError, RecordError
 from rrth_planner.model.scene import Scene
+from rrth_planner.model.stamp import NANOSECONDS
 from rrth_planner.ros.client.recording_files import decoder_of, stored_messages
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.body_publishers import BodyPublishers, UNNUMBERED
-from rrth_planner.ros.messages.fields import NANOSECONDS, seconds_of
+from rrth_planner.ros.messages.fields import seconds_of
 from rrth_planner.ros.messages.goal import goal_from_msg
 from rrth_planner.ros.messages.joint_state import has_joint_of, joint_reading
 from rrth_planner.ros.messages.marker_edits import read_edits

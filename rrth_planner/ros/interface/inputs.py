@@ -2,29 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """The latest good body, target and joint positions, and the last rejections."""
 
-from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 import time
 from typing import Any, Generic, TypeVar
 
-import numpy as np
-from rrth_planner.execution.executing_motion import (
-    ExecutingMotion,
-    LONGEST_LAG,
-    predict_start_state,
-    sharp_phase_of,
-)
-from rrth_planner.execution.expected_wearer import expected_scene
 from rrth_planner.execution.joint_reading import JointReading
-from rrth_planner.model.arm import ArmModel
-from rrth_planner.model.arrays import Array
-from rrth_planner.model.errors import MessageError, RequestError, RrthError
+from rrth_planner.execution.recent_wearer import RecentWearer
+from rrth_planner.model.errors import MessageError, RequestError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.status import ErrorCode
-from rrth_planner.model.trajectory import REST_SPEED, StartState
-from rrth_planner.ros.interface.parameters import AUTO, PlannerParameters
+from rrth_planner.requests.inputs import InputSnapshot
+from rrth_planner.requests.parameters import RequestParameters
+from rrth_planner.ros.interface.parameters import AUTO
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.body_source import BodySource
 from rrth_planner.ros.messages.error_codes import code_of_rejection
@@ -33,17 +23,8 @@ T = TypeVar('T')
 # A message measured further ahead of now than this came before the clock was set back: its age is
 # unknown [s].
 CLOCK_STEP = 0.1
-# A wearer moves whose boxes have changed by so much [m] within so long [s]; of so many bodies.
-MOVED, LATELY, REMEMBERED = 0.01, 0.25, 64
-# Velocities are those of this time at least: what a tracker's noise adds is small then [s].
-STEADY = 0.08
-
 # Why a body that was sent once is not taken as that of a wearer who stands still.
 STREAM_ENDED = ', since a stream of bodies, or one with a stamp, has come (separation: auto)'
-
-
-class ArmHasMoved(RequestError):
-    """The arm is not at the start of the motion."""
 
 
 class Input(Generic[T]):
@@ -97,111 +78,6 @@ class Input(Generic[T]):
         return f'{age:.3f} s old, expected at most {timeout:g}' if 0.0 < timeout < age else ''
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class InputSnapshot:
-    """The inputs of one plan: a copy, which later messages do not change."""
-
-    scene: Scene
-    goal: PointingGoal
-    joints: JointReading
-    rest_speed: float = REST_SPEED
-
-    @property
-    def q_start(self) -> Array:
-        """Where the arm rests, shape (dof,) [rad]."""
-        return self.joints.mean_positions(self.rest_speed)
-
-    def is_moving(self, now: float) -> bool:
-        """Return whether the arm moves at a time [s]."""
-        return self.joints.is_moving(now, self.rest_speed)
-
-    def require_rest(self, now: float, arm: ArmModel) -> None:
-        """Raise ArmHasMoved where the arm moves at a time [s]."""
-        if self.is_moving(now):
-            expected = f'an arm at rest (at most {self.rest_speed:g} rad/s, rest_speed)'
-            velocities = self.joints.mean_velocities(self.rest_speed)
-            raise _rejection(arm, velocities, expected, ArmHasMoved)
-
-    def is_commanded(self, running: ExecutingMotion | None, delay: float) -> bool:
-        """Return whether the arm executes a motion, at most so much later than stated [s]."""
-        joints = self.joints
-        return running is not None and running.follows(
-            joints.positions, joints.velocities, joints.taken, delay + LONGEST_LAG
-        )
-
-    def is_about_to_move(
-        self, running: ExecutingMotion | None, now: float, span: float, delay: float = 0.0
-    ) -> bool:
-        """Return whether the arm rests within its motion, and moves on in less than a span [s]."""
-        if running is None or self.is_moving(now):
-            return False
-        if self.is_commanded(running, delay):
-            return running.will_move(now, span)
-        located = self._localize(running)
-        if located is None:
-            return False
-        phase, rate = located
-        then = running.start_time + phase + rate * (now - self.joints.taken)
-        return running.will_move(then, rate * span)
-
-    def start_state_at(
-        self, running: ExecutingMotion | None, time: float, arm: ArmModel, delay: float = 0.0
-    ) -> StartState:
-        """
-        Return the state of a moving arm at a time [s], or raise RequestError.
-
-        It is the commanded one where the arm executes its motion, else predicted by its reading.
-        """
-        joints = self.joints
-        if not np.isfinite(joints.velocities).all():
-            raise _rejection(arm, joints.velocities, 'a velocity for every joint')
-        known = None
-        if (
-            running is not None
-            and running.start_time <= time
-            and (joints.taken < running.start_time or self.is_commanded(running, delay))
-        ):
-            # The arm may lag, or was not on it yet: a stop, say, may just have been published.
-            known = joints.taken - running.start_time, 1.0
-        elif running is not None and not self.is_moving(joints.taken):
-            known = self._localize(running)
-        try:
-            # Velocities that overflow match no motion.
-            with np.errstate(all='ignore'):
-                return predict_start_state(
-                    joints.positions,
-                    joints.velocities,
-                    None if running is None else running.trajectory,
-                    time - joints.taken,
-                    known,
-                )
-        except RrthError as problem:
-            expected = f'a finite position {time - joints.taken:.3f} s later'
-            raise _rejection(arm, joints.velocities, expected) from problem
-
-    def _localize(self, running: ExecutingMotion) -> tuple[float, float] | None:
-        """Return the time within a motion of an arm that hardly moves [s], and its rate."""
-        joints = self.joints
-        q, v = joints.positions, joints.velocities
-        # An arm that executes its motion slowly may seem on time while it hardly moves.
-        with np.errstate(all='ignore'):
-            found = sharp_phase_of(q, v, running.trajectory)
-        if found is None and running.is_on_time(q, v, joints.taken):
-            # An arm at rest for a moment has no velocity to locate it by.
-            found = joints.taken - running.start_time, 1.0
-        return found
-
-
-def _rejection(
-    arm: ArmModel, velocities: Array, expected: str, kind: type[RequestError] = RequestError
-) -> RequestError:
-    speeds = np.abs(velocities)
-    k = int(np.argmax(np.where(np.isnan(speeds), np.inf, speeds)))
-    speed = f'{speeds[k]:.3f} {"m/s" if arm.is_prismatic[k] else "rad/s"}'
-    sentence = f'{arm.joint_names[k]} moves at {speed}, expected {expected}'
-    return kind(ErrorCode.START_STATE_INVALID, sentence)
-
-
 class Inputs:
     """The three topics that a plan needs."""
 
@@ -213,8 +89,8 @@ class Inputs:
         self.joints: Input[JointReading | None] = Input(joint_topic, None)
         # Why the last message with all joints was rejected; None: it was not.
         self.joint_rejection: MessageError | None = None
-        # The last bodies, and when they came by the monotonic clock [s].
-        self._bodies: deque[tuple[float, WearerBody]] = deque(maxlen=REMEMBERED)
+        # By the monotonic clock.
+        self._recent = RecentWearer(scene_of)
 
     def shift(self, step: float) -> None:
         """Take the times of all inputs by a clock that was set forward by a step [s]."""
@@ -227,31 +103,28 @@ class Inputs:
 
     def body_came(self) -> None:
         """Remember the present body, to see whether the wearer moves."""
-        bodies = self._bodies
-        # Each part may come by itself, in a message of its own: of many bodies a few are enough.
-        if len(bodies) > 1 and bodies[-1][0] - bodies[-2][0] < LATELY / REMEMBERED:
-            bodies.pop()
-        bodies.append((time.monotonic(), self.body.value))
+        self._recent.saw(self.body.value, time.monotonic())
 
     def is_wearer_moving(self) -> bool:
         """Return whether a box has moved lately by more than a tracker's noise."""
-        since = time.monotonic() - LATELY
-        bodies = [body for came, body in tuple(self._bodies) if came >= since]
-        if len(bodies) < 2:
-            return False
-        now, before = scene_of(bodies[-1]).numbers, scene_of(bodies[0]).numbers
-        return now.shape != before.shape or bool(np.abs(now - before).max(initial=0.0) > MOVED)
+        return self._recent.is_moving(time.monotonic())
 
     def expected_scene(self) -> Scene:
         """Return where moving parts of the wearer will be soon; no box where that is unknown."""
-        bodies = tuple(self._bodies)
-        if not bodies or time.monotonic() - bodies[-1][0] > LATELY:
-            return Scene(())
-        came, present = bodies[-1]
-        for then, before in reversed(bodies):
-            if STEADY <= came - then <= LATELY:
-                return expected_scene(scene_of(before), scene_of(present), came - then)
-        return Scene(())
+        return self._recent.expected(time.monotonic())
+
+    def body_age(self, now: float) -> float:
+        """Return how old the wearer is that is known now [s]; inf: that is not known."""
+        return self.body.age(now)
+
+    def time_until_known(self, steady: float) -> float:
+        """Return for how long it is not known whether he stands still; <= 0: it is known [s]."""
+        return self.source.time_until_known(steady)
+
+    @property
+    def reading(self) -> JointReading | None:
+        """The last good joint positions, however old."""
+        return self.joints.value
 
     @property
     def all(self) -> dict[str, Input[Any]]:
@@ -259,7 +132,7 @@ class Inputs:
         return {'body': self.body, 'target': self.target, 'joints': self.joints}
 
     def at(
-        self, now: float, parameters: PlannerParameters, goal: PointingGoal | None = None
+        self, now: float, parameters: RequestParameters, goal: PointingGoal | None = None
     ) -> InputSnapshot:
         """
         Return the inputs of a plan that begins now [s]; without a goal, the last target.
@@ -270,13 +143,17 @@ class Inputs:
             Something is missing, too old (`parameters` have the timeouts) or rejected.
 
         """
-        body = self.body_at(now, parameters)
+        scene = self.scene_at(now, parameters)
         goal = self._goal() if goal is None else goal
         joints = self.joints_at(now, parameters.joint_timeout)
-        return InputSnapshot(scene_of(body), goal, joints, parameters.rest_speed)
+        return InputSnapshot(scene, goal, joints, parameters.rest_speed)
+
+    def scene_at(self, now: float, parameters: RequestParameters) -> Scene:
+        """Return the present wearer [s], or raise RequestError where he is not known."""
+        return scene_of(self.body_at(now, parameters))
 
     def body_at(
-        self, now: float, parameters: PlannerParameters, keep_lost: float = 0.0
+        self, now: float, parameters: RequestParameters, keep_lost: float = 0.0
     ) -> WearerBody:
         """
         Return the present body [s], or raise RequestError where it is stale, rejected or partial.
@@ -317,7 +194,7 @@ class Inputs:
             raise _late(source, f'{late} s (body_timeout){why}', code)
         return body
 
-    def require_fresh(self, now: float, parameters: PlannerParameters) -> WearerBody:
+    def require_fresh(self, now: float, parameters: RequestParameters) -> WearerBody:
         """Return the present body [s] for a motion in progress; raise RequestError if stale."""
         self.joints_at(now, parameters.joint_timeout)
         return self.body_at(now, parameters, parameters.keep_lost)

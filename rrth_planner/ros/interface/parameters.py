@@ -5,10 +5,12 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rcl_interfaces.msg import SetParametersResult
+from rclpy.logging import get_logging_directory
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rrth_planner.collision.distance_library import LIBRARIES, require_library
@@ -191,6 +193,13 @@ class PlannerParameters(PlanSettings):
     def stands_still(self) -> bool:
         """Whether motions are published as they are planned since the body stands still."""
         return self.separates == AUTO and self.separation is None
+
+    @property
+    def incident_path(self) -> Path:
+        """Where incidents and flight records are written, by default among the logs of ROS."""
+        if self.incident_folder:
+            return Path(self.incident_folder).expanduser()
+        return Path(get_logging_directory()) / 'rrth_planner'
 
     @property
     def execution(self) -> ExecutionRules:

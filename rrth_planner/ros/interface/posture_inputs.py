@@ -15,9 +15,10 @@ from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rrth_planner.io.extras import require
 from rrth_planner.model.errors import MessageError, ModelError, OptionsError
+from rrth_planner.model.stamp import NANOSECONDS
 from rrth_planner.ros.interface.tracker_parameters import NAME, TrackerParameters
 from rrth_planner.ros.messages.definitions import fast_decoder, require_type
-from rrth_planner.ros.messages.fields import NANOSECONDS, nanoseconds_of
+from rrth_planner.ros.messages.fields import nanoseconds_of
 from rrth_planner.ros.messages.frames import FrameError, Frames
 from rrth_planner.ros.messages.posture import (
     posture_from_joint_state,

@@ -2,17 +2,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """The publishers of the planner: motions, and what RViz shows of them."""
 
+from collections.abc import Callable
+
 from diagnostic_msgs.msg import DiagnosticStatus
 from nav_msgs.msg import Path
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+from rrth_planner.execution.watch import MonitorRules
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
+from rrth_planner.model.stamp import NANOSECONDS, stamp_of
 from rrth_planner.model.trajectory import Trajectory
-from rrth_planner.ros.interface.parameters import ALWAYS, NEVER, PlannerParameters
-from rrth_planner.ros.messages.answer import Answer, answer_to_msg
+from rrth_planner.requests.answer import Answer
+from rrth_planner.ros.interface.parameters import ALWAYS, NEVER
+from rrth_planner.ros.messages.answer import answer_to_msg
 from rrth_planner.ros.messages.plan_markers import plan_markers
 from rrth_planner.ros.messages.trajectory import joint_trajectory_to_msg, tool_path_to_msg
 from rrth_planner.ros.middleware.qos import ANSWERED, COMMANDED, COMMITTED, LATCHED, RAY_CLEAR
@@ -27,9 +32,9 @@ LONGEST_FLUSH = 0.5
 class PlanPublishers:
     """The topics that the planner publishes; late subscribers get the last plan too."""
 
-    def __init__(self, node: Node, separates: str) -> None:
-        """Advertise them; separates: as in `PlannerParameters`."""
-        self._node = node
+    def __init__(self, node: Node, separates: str, base_frame: str) -> None:
+        """Advertise them; separates, base_frame: as in `PlannerParameters`."""
+        self._node, self._base_frame = node, base_frame
         # Of whole motions, and of commitments, which each are safe by themselves.
         self._whole: Publisher | None = None
         self._committed: Publisher | None = None
@@ -65,12 +70,12 @@ class PlanPublishers:
             self._node.destroy_publisher(whole)
 
     def publish_motion(
-        self, trajectory: Trajectory, parameters: PlannerParameters, begin: float
+        self, trajectory: Trajectory, parameters: MonitorRules, begin: float
     ) -> None:
         """Publish a motion for the arm to begin at a time [s]."""
         self._publisher(parameters).publish(self.motion(trajectory, parameters, begin))
 
-    def _publisher(self, parameters: PlannerParameters) -> Publisher:
+    def _publisher(self, parameters: MonitorRules) -> Publisher:
         """Return the publisher of what the arm executes of a motion with these parameters."""
         found = self._whole if parameters.separation is None else self._committed
         if found is None:
@@ -78,17 +83,26 @@ class PlanPublishers:
         return found
 
     def motion(
-        self, trajectory: Trajectory, parameters: PlannerParameters, begin: float
+        self, trajectory: Trajectory, parameters: MonitorRules, begin: float
     ) -> JointTrajectory:
         """Return the message of such a motion."""
         return joint_trajectory_to_msg(
-            trajectory, parameters.arm.joint_names, parameters.base_frame, begin
+            trajectory, parameters.arm.joint_names, self._base_frame, begin
         )
 
-    def publish_planned(self, msg: JointTrajectory) -> None:
-        """Publish the message of a planned motion to be seen, with separation."""
-        if self._planned is not None:
-            self._planned.publish(msg)
+    def prepared(
+        self, trajectory: Trajectory, parameters: MonitorRules
+    ) -> Callable[[float], None]:
+        """Return what publishes a planned motion that begins at a time [s], with separation."""
+        planned, msg = self._planned, self.motion(trajectory, parameters, 0.0)
+
+        def publish(begin: float) -> None:
+            if planned is not None:
+                stamp = msg.header.stamp
+                stamp.sec, stamp.nanosec = divmod(stamp_of(begin), NANOSECONDS)
+                planned.publish(msg)
+
+        return publish
 
     def publish_answer(self, answer: Answer) -> None:
         """Publish an answer with its figures."""
@@ -121,16 +135,16 @@ class PlanPublishers:
             if publisher is not None:
                 publisher.wait_for_all_acked(Duration(seconds=LONGEST_FLUSH))
 
-    def tool_path(self, trajectory: Trajectory, parameters: PlannerParameters) -> Path:
+    def tool_path(self, trajectory: Trajectory, parameters: MonitorRules) -> Path:
         """Return the tool's path along a motion."""
-        return tool_path_to_msg(parameters.arm, trajectory, parameters.base_frame, TOOL_PATH_POSES)
+        return tool_path_to_msg(parameters.arm, trajectory, self._base_frame, TOOL_PATH_POSES)
 
     def is_view_subscribed(self) -> bool:
         """Return whether `publish_view` has any subscriber."""
         return any(p.get_subscription_count() > 0 for p in (self._tool_path, self._markers))
 
     def publish_view(
-        self, trajectory: Trajectory, parameters: PlannerParameters, scene: Scene, target: Array
+        self, trajectory: Trajectory, parameters: MonitorRules, scene: Scene, target: Array
     ) -> None:
         """Publish what shows a motion."""
         path = self.tool_path(trajectory, parameters)

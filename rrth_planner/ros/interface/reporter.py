@@ -11,15 +11,15 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rrth_planner.execution.body_motion import body_at, BodyMotion, RAISED, SHARE
-from rrth_planner.execution.separation_status import SeparationState, SeparationStatus
+from rrth_planner.execution.separation_status import NO_PROMISE, SeparationState, SeparationStatus
 from rrth_planner.model.errors import one_line
 from rrth_planner.model.separation import governing_speed, SeparationRules
 from rrth_planner.model.status import ErrorCode
+from rrth_planner.requests.outcome import Outcome
 from rrth_planner.ros.interface.figures import Figures
 from rrth_planner.ros.interface.inputs import Inputs
-from rrth_planner.ros.interface.outcome import Outcome
 from rrth_planner.ros.interface.parameters import in_effect, PlannerParameters
-from rrth_planner.ros.interface.separation_status import LEVELS, NO_PROMISE, separation_to_msg
+from rrth_planner.ros.interface.separation_status import LEVELS, separation_to_msg
 from rrth_planner.ros.messages.answer import FIGURES, figures_shown
 from rrth_planner.ros.messages.body import WearerBody
 from rrth_planner.ros.messages.diagnostics import GIVEN_UP_KEY, REQUEST_KEY, status_to_msg

@@ -10,11 +10,6 @@ from rrth_planner.execution.separation_status import SeparationState, Separation
 from rrth_planner.model.errors import MessageError, one_line
 from rrth_planner.ros.messages.diagnostics import status_to_msg
 
-# What a motion beside a body that stands still comes without, and how to have it.
-NO_PROMISE = (
-    'nothing is promised of a wearer who moves, since his body came as one that stands still: '
-    'publish bodies as a stream, stamped, at 30 Hz or more'
-)
 RATE_KEY, BAR_KEY, BOX_KEY = 'rate [-]', 'part of the arm', 'box'
 LEVELS = {
     SeparationState.NORMAL: DiagnosticStatus.OK,

@@ -8,9 +8,9 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rrth_planner.model.errors import RrthError
+from rrth_planner.model.stamp import NANOSECONDS
 from rrth_planner.ros.interface.figures import Figures
 from rrth_planner.ros.messages.diagnostics import status_to_msg
-from rrth_planner.ros.messages.fields import NANOSECONDS
 
 # Diagnostics are published so often, and rejections are logged at most so often [s].
 DIAGNOSTICS_PERIOD, WARNING_PERIOD = 1.0, 5.0

@@ -3,16 +3,16 @@
 """Answers of a planner: code and sentence as a text, and the figures as a message."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 import math
 import re
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rrth_planner.model.errors import MessageError, one_line, shown
+from rrth_planner.model.stamp import NANOSECONDS
 from rrth_planner.model.status import ErrorCode
+from rrth_planner.requests.answer import Answer
 from rrth_planner.ros.messages.diagnostics import status_to_msg
-from rrth_planner.ros.messages.error_codes import answer
-from rrth_planner.ros.messages.fields import NANOSECONDS
 
 TEXT = re.compile(r'([A-Z_]+) \((-?\d{1,9})\): (.*)')
 ENDING = re.compile(r'(?:.*; )?answer (\d{1,18})')
@@ -27,36 +27,6 @@ FIGURES = {
     'least_clearance': ('least clearance [m]', '.4f'),
 }
 NUMBER_KEY, CODE_KEY, STAMP_KEY = 'answer', 'code', 'stamp'
-
-
-@dataclass(frozen=True, slots=True)
-class Answer:
-    """
-    An answer of the planner.
-
-    Parameters
-    ----------
-    figures : mapping
-        Of the motion, as far as known: `waypoints`, `duration` [s], `path_length` [rad],
-        `least_clearance` [m], `planning_time_ms`, `response_time_ms` and `seed`.
-    number : int
-        Of the answer, from 1 on; 0: it has none.
-    stamp : int or None
-        That of the motion's message [ns]; None: no motion was published, or its stamp is not
-        known.
-
-    """
-
-    code: ErrorCode
-    sentence: str
-    figures: Mapping[str, float] = field(default_factory=dict)
-    number: int = 0
-    stamp: int | None = None
-
-    @property
-    def text(self) -> str:
-        """Code and sentence in one line, as services answer them."""
-        return answer(self.code, self.sentence)
 
 
 def answer_from_text(text: str) -> Answer:

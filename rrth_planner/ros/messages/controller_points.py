@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from rrth_planner.model.errors import MessageError
-from rrth_planner.ros.messages.fields import NANOSECONDS, nanoseconds_of
+from rrth_planner.model.stamp import NANOSECONDS
+from rrth_planner.ros.messages.fields import nanoseconds_of
 from rrth_planner.ros.messages.trajectory import (
     check_end,
     check_times,

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Error codes of answers: names and numbers of moveit_msgs/MoveItErrorCodes."""
 
-from rrth_planner.model.errors import MessageError, one_line
-from rrth_planner.model.status import ErrorCode, PlanStatus
+from rrth_planner.model.errors import MessageError
+from rrth_planner.model.status import ErrorCode
 from rrth_planner.ros.messages.frames import FrameError
 
 # When each is answered, and what the sentence behind it names.
@@ -35,35 +35,7 @@ MEANINGS = {
     'the details',
 }
 
-# To plan again in a moment changes nothing: neither wearer nor inputs are the reason.
-FINAL = frozenset(
-    {
-        ErrorCode.FAILURE,
-        ErrorCode.PREEMPTED,
-        ErrorCode.NO_IK_SOLUTION,
-        ErrorCode.INVALID_GOAL_CONSTRAINTS,
-    }
-)
-
-CODE_OF_STATUS = {
-    PlanStatus.SOLVED: ErrorCode.SUCCESS,
-    PlanStatus.TIMEOUT: ErrorCode.TIMED_OUT,
-    PlanStatus.SAMPLE_LIMIT: ErrorCode.PLANNING_FAILED,
-    PlanStatus.CANCELLED: ErrorCode.PREEMPTED,
-    PlanStatus.START_OUT_OF_BOUNDS: ErrorCode.START_STATE_INVALID,
-    PlanStatus.START_MOVES: ErrorCode.START_STATE_INVALID,
-    PlanStatus.START_IN_COLLISION: ErrorCode.START_STATE_IN_COLLISION,
-    PlanStatus.GOAL_IN_COLLISION: ErrorCode.GOAL_IN_COLLISION,
-    PlanStatus.GOAL_UNREACHABLE: ErrorCode.NO_IK_SOLUTION,
-    PlanStatus.NOT_CERTIFIED: ErrorCode.FAILURE,
-}
-
 
 def code_of_rejection(problem: MessageError, otherwise: ErrorCode) -> ErrorCode:
     """Return the code of a rejected message: the one of a bad frame, or another one."""
     return ErrorCode.FRAME_TRANSFORM_FAILURE if isinstance(problem, FrameError) else otherwise
-
-
-def answer(code: ErrorCode, sentence: str) -> str:
-    """Return the answer of a service, in one line: `NAME (number): sentence`."""
-    return one_line(f'{code.name} ({code.value}): {sentence}')

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import MessageError
+from rrth_planner.model.stamp import NANOSECONDS
 
 # When a message was sent: source timestamp [ns] and sequence number.
 Stamp = tuple[int, int]
 
 # A quaternion this far from unit length is no rounding but a mistake.
 QUATERNION_TOLERANCE = 1e-2
-NANOSECONDS = 1_000_000_000
 
 
 def numbers(values: Sequence[float], name: str, unit: str) -> Array:
@@ -46,13 +46,6 @@ def unit_quaternion_of(quaternion: Any, name: str) -> tuple[float, float, float,
             'length 1 [-]'
         )
     return q
-
-
-def stamp_of(seconds: float) -> int:
-    """Return the stamp of a time [s], as a whole number [ns]."""
-    # Nanoseconds since 1970 as one float would be 256 ns apart: a kink of 0.2 rad/s^2 at 1 kHz.
-    whole = math.floor(seconds)
-    return whole * NANOSECONDS + round((seconds - whole) * NANOSECONDS)
 
 
 def seconds_of(time: Any) -> float:

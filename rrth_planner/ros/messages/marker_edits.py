@@ -16,8 +16,8 @@ from rrth_planner.kernels.layout import NUMBERS, ROTATION, SIZE
 from rrth_planner.model.arrays import Array, FARTHEST
 from rrth_planner.model.errors import MessageError, SceneError
 from rrth_planner.model.scene import Box
+from rrth_planner.model.stamp import NANOSECONDS
 from rrth_planner.ros.messages.fields import (
-    NANOSECONDS,
     nanoseconds_of,
     seconds_of,
     triple_of,

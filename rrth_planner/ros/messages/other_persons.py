@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from builtin_interfaces.msg import Duration, Time
 import numpy as np
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.stamp import NANOSECONDS
 from rrth_planner.ros.messages.body_writer import COLOR
-from rrth_planner.ros.messages.fields import NANOSECONDS
 from rrth_planner.wearer.joint_positions import FARTHEST_POINT
 from visualization_msgs.msg import Marker
 

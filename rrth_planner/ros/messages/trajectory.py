@@ -14,13 +14,12 @@ from rrth_planner.model.arm import ArmModel, tool_pose
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import MessageError, RrthError
 from rrth_planner.model.rotation import quaternion_xyzw
+from rrth_planner.model.stamp import NANOSECONDS, stamp_of
 from rrth_planner.model.trajectory import sample, Trajectory
 from rrth_planner.ros.messages.fields import (
-    NANOSECONDS,
     nanoseconds_of,
     numbers,
     seconds_of,
-    stamp_of,
 )
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 

@@ -14,7 +14,6 @@ import math
 from threading import RLock
 import time
 import traceback
-from typing import cast
 
 import numpy as np
 from rclpy.clock import Clock, ClockType
@@ -44,16 +43,16 @@ from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.fail_safe_stop import pending
 from rrth_planner.execution.flight_recorder import Fate, FlightRecorder
 from rrth_planner.execution.remaining_motion import is_ray_clear
-from rrth_planner.execution.watch import Level, MonitorState, Stop, Watch
+from rrth_planner.execution.watch import Level, MonitorRules, MonitorState, Stop, Watch
 from rrth_planner.model.errors import one_line, RequestError
 from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.stamp import NANOSECONDS
 from rrth_planner.model.status import ErrorCode
 from rrth_planner.ros.interface.inputs import Inputs
-from rrth_planner.ros.interface.parameters import NEVER, PlannerParameters
+from rrth_planner.ros.interface.parameters import NEVER
 from rrth_planner.ros.interface.publishers import PlanPublishers
 from rrth_planner.ros.interface.reporter import Reporter
 from rrth_planner.ros.messages.body import scene_of, WearerBody
-from rrth_planner.ros.messages.fields import NANOSECONDS
 
 # Period of the checks of the inputs and of the commanded motion [s].
 CHECK_PERIOD = 0.02
@@ -97,7 +96,7 @@ class ExecutionMonitor:
         self,
         planned: ExecutingMotion,
         goal: PointingGoal,
-        parameters: PlannerParameters,
+        parameters: MonitorRules,
         publish: Callable[[], None] = lambda: None,
         joins: float | None = math.inf,
         planned_from: ExecutingMotion | None = None,
@@ -225,15 +224,6 @@ class ExecutionMonitor:
             watch = self._watch
             self._watch = Watch(rules=watch.rules, motion_topic=watch.motion_topic)
 
-    def has_stopped(self, goal: PointingGoal) -> bool:
-        """Return whether a stop of a motion to this goal is to be taken, and planned after."""
-        return any(stop.goal is goal and stop.is_replanned for stop in self._watch.stops)
-
-    @property
-    def executes_whole(self) -> bool:
-        """Whether the arm executes a motion that was published as a whole, or the stop of one."""
-        return self._watch.running is not None and self._watch.rules.separation is None
-
     def _run_fail_safe(self, check: Callable[[], None]) -> None:
         """Run a check; an error in it ends in a stop."""
         try:
@@ -335,9 +325,7 @@ class ExecutionMonitor:
         command = decision.command
         if command is not None:
             motion = command.motion.trajectory
-            # Motions begin with the parameters of the node.
-            parameters = cast(PlannerParameters, command.rules)
-            self._publishers.publish_motion(motion, parameters, command.begin)
+            self._publishers.publish_motion(motion, command.rules, command.begin)
 
     def _report(self, before: Watch, decision: Decision, took: float) -> None:
         """Report what was decided in so long a time [s]: diagnostics, `~/state` and log."""

@@ -19,6 +19,7 @@ from rrth_planner.collision.violation import Violation
 from rrth_planner.execution.coroutines import Coroutines, Wait
 from rrth_planner.model.errors import one_line, RequestError
 from rrth_planner.model.status import ErrorCode
+from rrth_planner.pipeline.host import random_seed
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.planning_process import (
     LONGEST_WARM_UP,
@@ -109,6 +110,10 @@ class NodeHost:
     def steady(self) -> float:
         """Return a time that never steps [s]."""
         return time.monotonic()
+
+    def new_seed(self) -> int:
+        """Return one that nobody knows."""
+        return random_seed()
 
     async def sleep(self, seconds: float) -> None:
         """Return after a time [s]."""

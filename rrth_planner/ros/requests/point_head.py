@@ -19,8 +19,9 @@ from rrth_planner.model.arm import pointing_angle
 from rrth_planner.model.errors import MessageError
 from rrth_planner.model.goal import PacedGoal, PointingGoal
 from rrth_planner.model.status import ErrorCode
+from rrth_planner.requests.outcome import Outcome
+from rrth_planner.requests.request_queue import PlanQueue
 from rrth_planner.ros.interface.inputs import Inputs
-from rrth_planner.ros.interface.outcome import Outcome
 from rrth_planner.ros.interface.reporter import Reporter
 from rrth_planner.ros.interface.scene_monitor import SceneMonitor
 from rrth_planner.ros.messages.error_codes import code_of_rejection
@@ -30,7 +31,6 @@ from rrth_planner.ros.middleware.answers import Answers
 from rrth_planner.ros.middleware.paced_action_server import PacedActionServer
 from rrth_planner.ros.middleware.qos import SERVICE
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor
-from rrth_planner.ros.requests.request_queue import PlanQueue
 
 # Period of the feedback [s].
 PERIOD = 0.05

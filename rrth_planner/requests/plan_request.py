@@ -5,7 +5,6 @@
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
 import math
-import secrets
 
 import numpy as np
 from rrth_planner.execution.command import ahead
@@ -20,19 +19,19 @@ from rrth_planner.model.trajectory import MotionState, sample
 from rrth_planner.pipeline.host import Host
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.request import PlanQuestion
-from rrth_planner.ros.interface.inputs import ArmHasMoved, Inputs, InputSnapshot
-from rrth_planner.ros.interface.outcome import Outcome
-from rrth_planner.ros.interface.parameters import PlannerParameters
-from rrth_planner.ros.messages.error_codes import CODE_OF_STATUS
-from rrth_planner.ros.requests.incidents import PlanError
-from rrth_planner.ros.requests.pace import (
+from rrth_planner.requests.answer import CODE_OF_STATUS
+from rrth_planner.requests.incidents import PlanError
+from rrth_planner.requests.inputs import ArmHasMoved, Inputs, InputSnapshot
+from rrth_planner.requests.outcome import Outcome
+from rrth_planner.requests.pace import (
     is_too_short,
     limits_of,
     MOST_SLOWER,
     require_long_enough,
     slower,
 )
-from rrth_planner.ros.requests.revalidation import Revalidation
+from rrth_planner.requests.parameters import RequestParameters
+from rrth_planner.requests.revalidation import Revalidation
 
 # A request that waits for its handover looks so often whether it was cancelled [s].
 LONGEST_SLEEP = 0.05
@@ -41,7 +40,7 @@ LONGEST_SLEEP = 0.05
 async def plan_request(
     host: Host,
     inputs: Inputs,
-    parameters: PlannerParameters,
+    parameters: RequestParameters,
     should_stop: Callable[[], bool],
     publish: Callable[[Outcome, Revalidation], Awaitable[Outcome | None]],
     goal: PointingGoal | None = None,
@@ -98,7 +97,9 @@ async def plan_request(
                 if running is not None:
                     # The controller holds what it was given last, from which the arm may sag.
                     q_start = running.trajectory.positions[-1]
-            question = _question(snapshot, parameters, handover, q_start, inputs.body.age(now))
+            seed = host.new_seed() if parameters.seed < 0 else parameters.seed
+            age = inputs.body_age(now)
+            question = _question(snapshot, parameters, handover, q_start, age, seed)
             plan = await host.plan(question, should_stop)
             for _ in range(MOST_SLOWER):
                 if not is_too_short(plan, snapshot.goal):
@@ -179,7 +180,7 @@ def _handover(
     running: ExecutingMotion | None,
     time: float,
     lead: float,
-    parameters: PlannerParameters,
+    parameters: RequestParameters,
 ) -> Handover:
     """Return the handover from a moving arm at about a time [s]."""
     delay = parameters.controller_delay
@@ -197,10 +198,11 @@ def _handover(
 
 def _question(
     snapshot: InputSnapshot,
-    parameters: PlannerParameters,
+    parameters: RequestParameters,
     handover: Handover | None,
     q_start: Array,
     body_age: float,
+    seed: int,
 ) -> PlanQuestion:
     separation = parameters.separation
     return PlanQuestion(
@@ -213,7 +215,7 @@ def _question(
         options=parameters.options,
         margin=parameters.margin,
         ray_guard_length=parameters.ray_guard_length,
-        seed=secrets.randbelow(2**31) if parameters.seed < 0 else parameters.seed,
+        seed=seed,
         moving=None if handover is None else handover.start_state,
         escape_depth=parameters.escape_depth,
         reserve=parameters.reserve,

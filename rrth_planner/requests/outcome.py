@@ -9,10 +9,9 @@ from rrth_planner.io.incident import Incident
 from rrth_planner.model.status import ErrorCode
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.pipeline.motion_plan import MotionPlan
-from rrth_planner.ros.interface.inputs import InputSnapshot
-from rrth_planner.ros.interface.parameters import PlannerParameters
-from rrth_planner.ros.messages.answer import Answer
-from rrth_planner.ros.messages.error_codes import answer
+from rrth_planner.requests.answer import Answer, answer
+from rrth_planner.requests.inputs import InputSnapshot
+from rrth_planner.requests.parameters import RequestParameters
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,7 +25,7 @@ class Outcome:
         Of the answer.
     handover : Handover or None
         None: the motion begins at rest.
-    parameters : PlannerParameters or None
+    parameters : RequestParameters or None
         Those of the plan.
     incident : Incident or None
         To be written to a file, which the answer names.
@@ -44,7 +43,7 @@ class Outcome:
     plan: MotionPlan | None = None
     snapshot: InputSnapshot | None = None
     handover: Handover | None = None
-    parameters: PlannerParameters | None = None
+    parameters: RequestParameters | None = None
     incident: Incident | None = None
     response_time: float = float('nan')
     stamp: int | None = None

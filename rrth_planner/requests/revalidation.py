@@ -23,8 +23,8 @@ from rrth_planner.model.status import ErrorCode
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.pipeline.host import Host
 from rrth_planner.pipeline.motion_plan import MotionPlan
-from rrth_planner.ros.interface.inputs import ArmHasMoved, Inputs, InputSnapshot
-from rrth_planner.ros.interface.parameters import PlannerParameters
+from rrth_planner.requests.inputs import ArmHasMoved, Inputs, InputSnapshot
+from rrth_planner.requests.parameters import RequestParameters
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,7 +51,7 @@ class Revalidation:
 
     inputs: Inputs
     host: Host
-    parameters: PlannerParameters
+    parameters: RequestParameters
     snapshot: InputSnapshot
     plan: MotionPlan
     handover: Handover | None

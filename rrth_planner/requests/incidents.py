@@ -8,7 +8,6 @@ import shlex
 import traceback
 from typing import cast
 
-from rclpy.logging import get_logging_directory
 from rrth_planner.collision.violation import Disagreement
 from rrth_planner.execution.flight_recorder import FlightRecorder
 from rrth_planner.execution.watch import Stop
@@ -18,7 +17,7 @@ from rrth_planner.model.errors import RecordError, RrthError
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.pipeline.host import Host
 from rrth_planner.pipeline.request import PlanQuestion
-from rrth_planner.ros.interface.parameters import PlannerParameters
+from rrth_planner.requests.parameters import RequestParameters
 
 # A folder keeps so many flight records, of up to some 20 MB each.
 MOST_FLIGHTS = 10
@@ -33,33 +32,25 @@ class PlanError(RrthError):
         self.question, self.trajectory = question, trajectory
 
 
-def incident_folder(given: str) -> Path:
-    """Return the folder of a parameter, by default one among the logs of ROS."""
-    if given:
-        return Path(given).expanduser()
-    return Path(get_logging_directory()) / 'rrth_planner'
-
-
-def keep(incident: Incident, folder: str) -> tuple[str, Path | None]:
+def keep(incident: Incident, folder: Path) -> tuple[str, Path | None]:
     """
     Write an incident to its file; return what to add to the answer, and the file.
 
     An error in writing does not change the answer.
     """
     try:
-        path = write_incident(incident, incident_folder(folder))
+        path = write_incident(incident, folder)
     except Exception as problem:
         reason = ' '.join(f'{type(problem).__name__}: {problem}'.split())
         return f'; no file was written to replay it: {reason}', None
     return f'; to replay it: ./run exec replay {shlex.quote(str(path))}', path
 
 
-def keep_flight(flight: FlightRecorder, folder: str) -> Path:
+def keep_flight(flight: FlightRecorder, folder: Path) -> Path:
     """Write the last events of the monitor to a file; raise RecordError where that fails."""
     time = datetime.now(timezone.utc).isoformat(timespec='microseconds')
     try:
-        content, where = flight.to_bytes(), incident_folder(folder)
-        return write_record(content, where, 'flight', time, '.flight', MOST_FLIGHTS)
+        return write_record(flight.to_bytes(), folder, 'flight', time, '.flight', MOST_FLIGHTS)
     except Exception as problem:
         what = f'{type(problem).__name__}: {problem}'
         raise RecordError(f'no flight record was written: {what}') from problem
@@ -99,7 +90,7 @@ async def incident_of_stop(stop: Stop, host: Host) -> Incident | None:
     """
     if stop.scene is None or stop.goal is None:
         return None
-    parameters, trajectory = cast(PlannerParameters, stop.parameters), stop.trajectory
+    parameters, trajectory = cast(RequestParameters, stop.parameters), stop.trajectory
     arm, margin, ray = parameters.arm, parameters.margin, parameters.ray_guard_length
     library = parameters.second_checker
     violation = await host.violation_seen(

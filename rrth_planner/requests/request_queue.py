@@ -1,11 +1,12 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Requests one after the other, as coroutines in the node's own thread."""
+"""Requests one after the other, as coroutines of one thread."""
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, replace
 import math
+from pathlib import Path
 import traceback
 from typing import cast
 
@@ -15,32 +16,28 @@ from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.flight_recorder import MEMORY
 from rrth_planner.execution.joint_reading import JointReading
 from rrth_planner.execution.remaining_motion import is_place_free
+from rrth_planner.execution.separation_status import NO_PROMISE
 from rrth_planner.execution.watch import Stop
 from rrth_planner.io.incident import Incident
 from rrth_planner.model.errors import LONGEST_SENTENCE, one_line, RecordError, RequestError
 from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.stamp import stamp_of
 from rrth_planner.model.status import ErrorCode
 from rrth_planner.pipeline.host import RequestHost
-from rrth_planner.ros.interface.inputs import Inputs
-from rrth_planner.ros.interface.outcome import Outcome
-from rrth_planner.ros.interface.parameters import PlannerParameters
-from rrth_planner.ros.interface.publishers import PlanPublishers
-from rrth_planner.ros.interface.reporter import Reporter
-from rrth_planner.ros.interface.separation_status import NO_PROMISE
-from rrth_planner.ros.messages.body import scene_of
-from rrth_planner.ros.messages.error_codes import answer, FINAL
-from rrth_planner.ros.messages.fields import NANOSECONDS, stamp_of
-from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor
-from rrth_planner.ros.requests.incidents import (
+from rrth_planner.requests.answer import answer, FINAL
+from rrth_planner.requests.ends import Monitor, Publishers, Report
+from rrth_planner.requests.incidents import (
     incident_of,
     incident_of_stop,
     keep,
     keep_flight,
     sentence_of,
 )
-from rrth_planner.ros.requests.plan_request import plan_request, require_not_cancelled
-from rrth_planner.ros.requests.revalidation import Revalidation
-from trajectory_msgs.msg import JointTrajectory
+from rrth_planner.requests.inputs import Inputs
+from rrth_planner.requests.outcome import Outcome
+from rrth_planner.requests.parameters import RequestParameters
+from rrth_planner.requests.plan_request import plan_request, require_not_cancelled
+from rrth_planner.requests.revalidation import Revalidation
 
 # Period of the work after a stop, and shortest time from one motion shown to the next [s].
 PERIOD, SHORTEST_SHOW = 0.05, 0.2
@@ -115,9 +112,9 @@ class PlanQueue:
     ----------
     host : RequestHost
         Runs the requests.
-    reporter : Reporter
+    report : Report
         Its parameters, as they are when a request's turn begins, are those of the plan.
-    monitor : ExecutionMonitor
+    monitor : Monitor
         Monitors each published motion; its stops are checked again here, and replanned.
 
     """
@@ -126,12 +123,12 @@ class PlanQueue:
         self,
         host: RequestHost,
         inputs: Inputs,
-        reporter: Reporter,
-        publishers: PlanPublishers,
-        monitor: ExecutionMonitor,
+        report: Report,
+        publishers: Publishers,
+        monitor: Monitor,
     ) -> None:
         """Start with nothing to do."""
-        self._host, self._inputs, self._reporter = host, inputs, reporter
+        self._host, self._inputs, self._report = host, inputs, report
         self._publishers, self._monitor = publishers, monitor
         self._open: set[_Ticket] = set()
         self._resumption: _Resumption | None = None
@@ -196,7 +193,7 @@ class PlanQueue:
 
     def _conclude(self, outcome: Outcome) -> None:
         """Report an outcome, and have its motion shown."""
-        self._reporter.conclude(outcome)
+        self._report.conclude(outcome)
         if outcome.trajectory is not None:
             self._unseen = outcome
 
@@ -220,7 +217,9 @@ class PlanQueue:
 
     def pursues(self, goal: PointingGoal) -> bool:
         """Return whether a motion to this goal is planned, or will be after a stop."""
-        return any(t.goal is goal for t in self._open) or self._monitor.has_stopped(goal)
+        return any(t.goal is goal for t in self._open) or any(
+            stop.goal is goal and stop.is_replanned for stop in self._monitor.watch.stops
+        )
 
     def why_given_up(self, goal: PointingGoal) -> tuple[ErrorCode, str] | None:
         """Return how the last try after a stop ended, where this goal was given up then."""
@@ -234,7 +233,7 @@ class PlanQueue:
         self._monitor.close()
         # Who waits hears of it, as far as that is possible.
         with suppress(Exception):
-            self._report()
+            self._conclude_answered()
             self._note_end()
         self._host.close()
 
@@ -269,7 +268,7 @@ class PlanQueue:
             )
         sentence = outcome.sentence
         if outcome.incident is not None:
-            sentence += await self._keep(outcome.incident, parameters.incident_folder)
+            sentence += await self._keep(outcome.incident, parameters.incident_path)
         if outcome.trajectory is None:
             return replace(outcome, sentence=sentence)
         if not self._publishers.has_listener():
@@ -280,7 +279,7 @@ class PlanQueue:
         return replace(outcome, sentence=sentence, response_time=took)
 
     async def _plan(
-        self, ticket: _Ticket, parameters: PlannerParameters, patience: float | None
+        self, ticket: _Ticket, parameters: RequestParameters, patience: float | None
     ) -> Outcome:
         """
         Return the outcome of a request, planned again while a wearer who moves is in its way.
@@ -298,8 +297,8 @@ class PlanQueue:
                 outcome: Outcome, revalidation: Revalidation, n_stops: int = n_stops
             ) -> Outcome | None:
                 assert outcome.trajectory is not None
-                # Its stamp is known once it is published.
-                msg = self._publishers.motion(outcome.trajectory, revalidation.parameters, 0.0)
+                # When it begins is known once it is published.
+                show = self._publishers.prepared(outcome.trajectory, revalidation.parameters)
                 await self._host.read()
                 # From here on nothing is awaited: no message comes in between.
                 if monitor.watch.n_faults != n_faults:
@@ -307,7 +306,7 @@ class PlanQueue:
                         ErrorCode.FAILURE,
                         f'an error while the motion was planned: {monitor.watch.stop_reason}',
                     )
-                return self._publish(ticket, outcome, revalidation, n_stops, msg)
+                return self._publish(ticket, outcome, revalidation, n_stops, show)
 
             outcome = await plan_request(
                 self._host,
@@ -326,20 +325,20 @@ class PlanQueue:
             await self._host.sleep(AGAIN)
             parameters = await self._parameters_for(ticket)
 
-    async def _parameters_for(self, ticket: _Ticket) -> PlannerParameters:
+    async def _parameters_for(self, ticket: _Ticket) -> RequestParameters:
         """Return the parameters of a plan, once it is known whether the body stands still."""
         end = self._host.steady() + LONGEST_UNKNOWN
         while not ticket.is_cancelled and self._host.steady() < end:
-            left = self._inputs.source.time_until_known(self._host.steady())
-            if not self._reporter.parameters.stands_still or left <= 0.0:
+            left = self._inputs.time_until_known(self._host.steady())
+            if not self._report.parameters.stands_still or left <= 0.0:
                 break
             await self._host.sleep(min(left, AGAIN))
-        return self._reporter.parameters
+        return self._report.parameters
 
-    def _require_same_source(self, parameters: PlannerParameters) -> None:
+    def _require_same_source(self, parameters: RequestParameters) -> None:
         """Raise RequestError where it is not known any more that the body stands still."""
-        is_standing = self._reporter.parameters.stands_still
-        left = self._inputs.source.time_until_known(self._host.steady())
+        is_standing = self._report.parameters.stands_still
+        left = self._inputs.time_until_known(self._host.steady())
         if is_standing != parameters.stands_still or (is_standing and left > 0.0):
             raise RequestError(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
@@ -347,7 +346,7 @@ class PlanQueue:
                 'stands still, or a stream of them',
             )
 
-    async def _await_clear_ray(self, parameters: PlannerParameters, ticket: _Ticket) -> None:
+    async def _await_clear_ray(self, parameters: RequestParameters, ticket: _Ticket) -> None:
         """
         Let a wearer who moves take a hand out of the pointing ray of an arm at rest.
 
@@ -362,12 +361,12 @@ class PlanQueue:
         ):
             await self._host.sleep(AGAIN)
 
-    def _is_ray_crossed(self, parameters: PlannerParameters) -> bool:
+    def _is_ray_crossed(self, parameters: RequestParameters) -> bool:
         """Return whether the arm rests, clear of the wearer but for its pointing ray."""
         now, arm = self._host.now(), parameters.arm
         try:
             joints = self._inputs.joints_at(now, parameters.joint_timeout)
-            scene = scene_of(self._inputs.body_at(now, parameters))
+            scene = self._inputs.scene_at(now, parameters)
         except RequestError:
             return False
         if joints.is_moving(now, parameters.rest_speed):
@@ -383,7 +382,7 @@ class PlanQueue:
         outcome: Outcome,
         revalidation: Revalidation,
         n_stops: int,
-        msg: JointTrajectory,
+        show: Callable[[float], None],
     ) -> Outcome | None:
         """
         Publish the motion of a request, and have it monitored; return the outcome with its stamp.
@@ -404,7 +403,7 @@ class PlanQueue:
         trajectory, plan, snapshot = outcome.trajectory, outcome.plan, outcome.snapshot
         assert trajectory is not None and plan is not None and snapshot is not None
         now = self._host.now()
-        self._reporter.body_used(self._inputs.body.age(now))
+        self._report.body_used(self._inputs.body_age(now))
         handover, start = outcome.handover, now + ahead(parameters.controller_delay)
         planned = ExecutingMotion(
             trajectory=trajectory,
@@ -412,20 +411,18 @@ class PlanQueue:
             target_distance=plan.target_distance,
             escape_time=plan.escape_time,
         )
-        stamp = msg.header.stamp
-        stamp.sec, stamp.nanosec = divmod(stamp_of(planned.start_time), NANOSECONDS)
         monitor.begin(
             planned,
             snapshot.goal,
             parameters,
-            lambda: self._publishers.publish_planned(msg),
+            lambda: show(planned.start_time),
             math.inf if handover is None else handover.joins,
             None if handover is None else handover.before,
         )
         # From here on the request cannot be cancelled.
         self._open.discard(ticket)
         self._pursued, self._given_up = ticket.request, (None, *CANCELLED)
-        self._reporter.pursued(ticket.request)
+        self._report.pursued(ticket.request)
         # As a whole it is published with what leads to it.
         whole = monitor.watch.running if parameters.separation is None else None
         published = planned if whole is None else whole
@@ -433,10 +430,11 @@ class PlanQueue:
 
     def follow_up(self) -> None:
         """Report and show what was planned; check stops a second time, and plan again."""
-        self._report()
+        self._conclude_answered()
         self._show_newest()
         self._save_if_failed()
-        if not self._monitor.executes_whole:
+        watch = self._monitor.watch
+        if watch.running is None or watch.rules.separation is not None:
             self._publishers.withdraw_whole()
         now, present = self._host.now(), self._host.steady()
         for stop in self._monitor.take_stops():
@@ -454,7 +452,7 @@ class PlanQueue:
                     self._n_requests,
                     now + duration,
                     present + duration + LONGEST_SETTLING,
-                    present + duration + self._reporter.parameters.patience,
+                    present + duration + self._report.parameters.patience,
                     is_during_stop=stop.scene is not None,
                 )
                 self._open.add(self._resumption.ticket)
@@ -463,13 +461,13 @@ class PlanQueue:
             self._give_up(resumption, *OVERTAKEN)
             self._discard_resumption()
         elif resumption is not None and resumption.is_due(
-            self._inputs.joints.value, self._reporter.parameters.rest_speed, present
+            self._inputs.reading, self._report.parameters.rest_speed, present
         ):
             self._resumption = None
             self._host.begin(self._resume(resumption))
         self._note_end()
 
-    def _report(self) -> None:
+    def _conclude_answered(self) -> None:
         """Report the outcomes whose answers have left meanwhile."""
         outcomes, self._unreported = self._unreported, []
         for outcome in outcomes:
@@ -489,10 +487,10 @@ class PlanQueue:
             self._pursued = None
             if not monitor.watch.has_arrived:
                 why = self.why_given_up(goal)
-                stopped = self._reporter.monitor_state[1] or monitor.watch.stop_reason
-                self._reporter.given_up(stopped if why is None else answer(*why))
+                stopped = monitor.watch.sentence or monitor.watch.stop_reason
+                self._report.given_up(stopped if why is None else answer(*why))
         if monitor.watch.running is None:
-            self._reporter.nothing_runs()
+            self._report.nothing_runs()
 
     def _is_overtaken(self, resumption: _Resumption) -> bool:
         """Return whether one was commanded since its stop, or requested since its first try."""
@@ -532,7 +530,7 @@ class PlanQueue:
         if is_solved or resumption.is_first:
             self._conclude(outcome)
         elif is_last:
-            self._reporter.revise(outcome.code, outcome.sentence)
+            self._report.revise(outcome.code, outcome.sentence)
         if not is_solved and (resumption.is_first or is_last):
             self._monitor.report_hold(outcome.text)
         if not is_last:
@@ -552,13 +550,13 @@ class PlanQueue:
         """Have the second checker check a stop that was published as proven free."""
         incident = await incident_of_stop(stop, self._host)
         if incident is not None:
-            parameters = cast(PlannerParameters, stop.parameters)
-            noted = await self._keep(incident, parameters.incident_folder)
+            parameters = cast(RequestParameters, stop.parameters)
+            noted = await self._keep(incident, parameters.incident_path)
             self._host.error(f'fail-safe stop: {incident.sentence}{noted}')
 
     async def save(self) -> str:
         """Have the last events of the monitor written to a file; return its name."""
-        folder = self._reporter.parameters.incident_folder
+        folder = self._report.parameters.incident_path
         try:
             return str(await self._host.help(keep_flight, self._monitor.flight, folder))
         except TimeoutError as problem:
@@ -584,13 +582,13 @@ class PlanQueue:
             what = str(problem)
         self._host.error(f'{self._monitor.watch.stop_reason}: {what}')
 
-    async def _keep(self, incident: Incident, folder: str) -> str:
+    async def _keep(self, incident: Incident, folder: Path) -> str:
         """Have an incident written to a file; return what to add to the answer."""
         try:
             noted, file = await self._host.help(keep, incident, folder)
         except TimeoutError as problem:
             noted, file = f'; no file was written to replay it: {problem}', None
-        self._reporter.incident(file)
+        self._report.incident(file)
         with suppress(RecordError):
             await self.save()
         return noted

@@ -1,0 +1,64 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The parameters of a rehearsed planner."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from rrth_planner.execution.commitments import ExecutionRules
+from rrth_planner.io.settings import PlanSettings
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.separation import Separation
+from rrth_planner.model.trajectory import MotionLimits
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class RehearsedParameters(PlanSettings):
+    """
+    Those of the planner node that a rehearsal has; the others are as they are by default.
+
+    Parameters
+    ----------
+    stop_limits : MotionLimits
+        Of fail-safe stops.
+    execution : ExecutionRules
+        How a motion is executed.
+    body_timeout, joint_timeout, keep_lost, patience : float
+        [s].
+    start_tolerance : float
+        Greatest distance of a joint from where its motion begins [rad].
+
+    """
+
+    arm: ArmModel
+    stop_limits: MotionLimits
+    execution: ExecutionRules
+    body_timeout: float
+    joint_timeout: float
+    keep_lost: float
+    patience: float
+    start_tolerance: float
+    stands_still: bool = False
+    replan: bool = True
+    required_boxes: tuple[str, ...] = ()
+    separates: str = 'true'
+
+    @property
+    def controller_delay(self) -> float:
+        """The greatest one [s]."""
+        return self.execution.controller_delay
+
+    @property
+    def rest_speed(self) -> float:
+        """The arm rests where no joint is faster [rad/s]."""
+        return self.execution.rest_speed
+
+    @property
+    def separation(self) -> Separation | None:
+        """What commitments are proven with."""
+        return self.execution.separation
+
+    @property
+    def incident_path(self) -> Path:
+        """Where nothing is written: a rehearsal writes no files."""
+        return Path()
