@@ -22,12 +22,12 @@ from rrth_planner.execution import (
     decide as deciding,
     event as events,
     fail_safe_stop as stops,
+    step,
 )
 from rrth_planner.execution.decision import Command, Decision
+from rrth_planner.execution.monitor import Monitor
 from rrth_planner.execution.tracked_motion import tracked_phase
 from rrth_planner.model.trajectory import part_of, Trajectory
-from rrth_planner.rehearsal import virtual_monitor
-from rrth_planner.rehearsal.virtual_monitor import VirtualMonitor
 from rrth_planner.rehearsal.world import World
 from rrth_planner.timing.fast_stop import fast_stop as fast_stop_of
 
@@ -179,13 +179,13 @@ def _reset_without_effect() -> Patches:
 def _exception_swallowed() -> Patches:
     """Let nothing follow from an error of the monitor."""
 
-    def take(self: VirtualMonitor, event: Any, waited: float = 0.0) -> None:
+    def take(self: Monitor, event: Any, waited: float = 0.0) -> None:
         try:
             self.begin(event)
         except Exception:
             return
 
-    return [(VirtualMonitor, 'take', take)]
+    return [(Monitor, 'take', take)]
 
 
 def _unsent_is_kept() -> Patches:
@@ -220,7 +220,7 @@ def _clock_step_ignored() -> Patches:
         is_step = isinstance(event, events.ClockStepped)
         return Decision(watch=watch) if is_step else former(watch, event)
 
-    return [(virtual_monitor, 'decide', decide)]
+    return [(step, 'decide', decide)]
 
 
 def _stop_is_not_tracked() -> Patches:

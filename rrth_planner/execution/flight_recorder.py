@@ -10,7 +10,6 @@ which are large and hardly ever change, are written once.
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from enum import IntEnum
 import hashlib
 import importlib
 import io
@@ -21,6 +20,7 @@ from rrth_planner.execution.decide import decide
 from rrth_planner.execution.decision import Command
 from rrth_planner.execution.event import Begin, BodyCame, Event, Fail
 from rrth_planner.execution.fail_safe_stop import pending
+from rrth_planner.execution.step import Fate
 from rrth_planner.execution.watch import MonitorRules, plain, PlainRules, Watch
 from rrth_planner.model.errors import RecordError
 from rrth_planner.model.scene import Scene, scene_of_bytes
@@ -49,19 +49,6 @@ BUILDERS = {
     ('rrth_planner.model.scene', 'scene_of_bytes'),
     ('rrth_planner.model.trajectory', '_of_bytes'),
 }
-
-
-class Fate(IntEnum):
-    """What became of a decision."""
-
-    # Published, if there was anything to publish, and kept.
-    KEPT = 0
-    # Its command was too late, or could not be published.
-    OTHERWISE = 1
-    # There was none, or it was not kept: an error.
-    NONE = 2
-    # Nor was there a stop: one is to be published.
-    PENDING = 3
 
 
 @dataclass(frozen=True, slots=True)

@@ -87,7 +87,7 @@ class VirtualInputs:
 
 
 class MonitorEnd:
-    """The virtual monitor as requests see it; see `requests.ends.Monitor`."""
+    """The virtual monitor as requests see it; see `requests.ends.MotionMonitor`."""
 
     def __init__(self, world: World) -> None:
         """Execute motions in a world."""

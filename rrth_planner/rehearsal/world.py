@@ -16,12 +16,12 @@ import numpy as np
 from rrth_planner.execution.decision import Command
 from rrth_planner.execution.event import BodyCame, Event, Look, Moment, Sight, Tick
 from rrth_planner.execution.joint_reading import JointReading, with_earlier
+from rrth_planner.execution.monitor import Monitor
 from rrth_planner.execution.recent_wearer import RecentWearer
 from rrth_planner.execution.watch import MonitorRules
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.rehearsal.timeline import Timeline
-from rrth_planner.rehearsal.virtual_monitor import VirtualMonitor
 from rrth_planner.simulation.lagging_arm import LaggingArm
 from rrth_planner.simulation.trajectory_controller import (
     commanded_state,
@@ -96,7 +96,7 @@ class World:
     ----------
     arm : LaggingArm
         What executes the commands.
-    monitor : VirtualMonitor
+    monitor : Monitor
         What is tried.
 
     """
@@ -118,7 +118,7 @@ class World:
         self.rng = np.random.default_rng(seed)
         self.timeline = Timeline(BEGIN)
         self.arm = LaggingArm(q, controller_period, lag, controller, BEGIN)
-        self.monitor = VirtualMonitor(rules, self.moment, self.look, self.send, self._deciding)
+        self.monitor = Monitor(rules, self.moment, self.look, self.send, self._deciding)
         # Until when the host stands still, the middleware fails, frames are lost and the
         # controller rejects what it is given [s].
         self.stands_until = self.fails_until = self.blind_until = self.rejects_until = -math.inf

@@ -20,7 +20,7 @@ from rrth_planner.requests.outcome import Outcome
 from rrth_planner.requests.parameters import RequestParameters
 
 
-class Monitor(Protocol):
+class MotionMonitor(Protocol):
     """What executes motions, watches over them and stops them."""
 
     @property

@@ -25,7 +25,7 @@ from rrth_planner.model.stamp import stamp_of
 from rrth_planner.model.status import ErrorCode
 from rrth_planner.pipeline.host import RequestHost
 from rrth_planner.requests.answer import answer, FINAL
-from rrth_planner.requests.ends import Monitor, Publishers, Report
+from rrth_planner.requests.ends import MotionMonitor, Publishers, Report
 from rrth_planner.requests.incidents import (
     incident_of,
     incident_of_stop,
@@ -114,7 +114,7 @@ class PlanQueue:
         Runs the requests.
     report : Report
         Its parameters, as they are when a request's turn begins, are those of the plan.
-    monitor : Monitor
+    monitor : MotionMonitor
         Monitors each published motion; its stops are checked again here, and replanned.
 
     """
@@ -125,7 +125,7 @@ class PlanQueue:
         inputs: Inputs,
         report: Report,
         publishers: Publishers,
-        monitor: Monitor,
+        monitor: MotionMonitor,
     ) -> None:
         """Start with nothing to do."""
         self._host, self._inputs, self._report = host, inputs, report

@@ -2,18 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Events in any order: what holds of the monitor's memory, and of its commands, after each."""
 
-from dataclasses import replace
-
 from decisions import ARM, BEGIN, FAR, GOAL, hand, idle, Rules, turn
 from hypothesis import settings, strategies as st
 from hypothesis.stateful import initialize, invariant, rule, RuleBasedStateMachine
 import numpy as np
 from rrth_planner.execution import event as events
-from rrth_planner.execution.decide import decide
 from rrth_planner.execution.event import Look, Moment, Sight
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.fail_safe_stop import pending
 from rrth_planner.execution.joint_reading import JointReading
+from rrth_planner.execution.step import following, step_of
 from rrth_planner.execution.watch import MonitorState
 from rrth_planner.model.errors import RequestError
 from rrth_planner.model.scene import Scene
@@ -78,28 +76,30 @@ class Monitor(RuleBasedStateMachine):
 
     def take(self, event, is_published=True):
         """Take an event, and all that follows at once."""
-        before = self.watch
+        before, sent = self.watch, []
+
+        def publish(command):
+            if not is_published:
+                raise ConnectionError('no middleware')
+            sent.append(command)
+
         try:
-            decision = decide(before, event)
+            step = step_of(before, event, lambda: 0.0, publish)
         except RequestError:
             raise
         except Exception:
             # As the node does after any error.
             self.watch = pending(before, events.Fail(event.at, 'an error', False, True))
             return
-        if decision.command is not None and not is_published:
-            if decision.otherwise is None:
-                fail = events.Fail(event.at, 'not published', False, True)
-                self.watch = pending(before, fail)
-                return
-            decision = decision.otherwise
-        self.watch = decision.watch
-        if decision.command is not None:
-            self.publish(decision.command)
-        if decision.next is not None:
-            self.take(replace(decision.next, at=self.at()), is_published)
-        if decision.is_look_due:
-            self.take(events.BodyCame(self.at(), None, Look(self.scene, Scene(()), 0.0)))
+        self.watch = step.decision.watch
+        for command in sent:
+            self.publish(command)
+        for happens in following(step, self.at, self.look, lambda: 0.0):
+            self.take(happens(), is_published)
+
+    def look(self, at):
+        """Return the wearer beside the running motion."""
+        return Look(self.scene, Scene(()), 0.0)
 
     def publish(self, command):
         """Have the arm take a command, which continues the one before where it follows that."""

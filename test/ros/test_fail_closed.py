@@ -20,6 +20,7 @@ from rrth_planner.execution import (  # noqa: E402
     decide as decisions,
     fail_safe_stop,
     flight_recorder,
+    step,
     tracked_motion,
 )
 from rrth_planner.execution.commitments import Commitments  # noqa: E402
@@ -169,11 +170,15 @@ def test_a_fault_at_any_call_of_the_monitor_stops_the_arm(monitored, kind, which
     assert n_hit >= (50 if which == 'body' else 25)
 
 
+# What the monitor's functions are in.
+MODULES = (execution_monitor, step, decisions, fail_safe_stop, commitments, tracked_motion)
+
+
 def places():
     """Return what the monitor calls, as (owner, name)."""
     found = [
         (module, name)
-        for module in (execution_monitor, decisions, fail_safe_stop, commitments, tracked_motion)
+        for module in MODULES
         for name, value in vars(module).items()
         if isinstance(value, FunctionType)
         and value.__module__.startswith(('rrth_planner.execution', 'rrth_planner.ros.messages'))

@@ -11,13 +11,13 @@ pytest.importorskip('fcl')
 from rclpy.parameter import Parameter  # noqa: E402
 from rrth_planner.collision import reference_checker, trajectory_validation  # noqa: E402
 from rrth_planner.collision.violation import Violation  # noqa: E402
+from rrth_planner.execution import step  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.model.arm import forward_kinematics, tool_pose  # noqa: E402
 from rrth_planner.model.trajectory import positions_at  # noqa: E402
 from rrth_planner.pipeline import in_process_planner  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of  # noqa: E402
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg  # noqa: E402
-from rrth_planner.ros.monitor import execution_monitor  # noqa: E402
 from samples import array, box, fenced, FOLDED, JOINTS, wearer  # noqa: E402
 from stranger import _one_try, _start, inputs_of, say_all  # noqa: E402, F401
 
@@ -56,7 +56,7 @@ def test_an_arm_that_the_wearer_leaned_into_escapes_and_the_answer_says_so(
     start, monkeypatch, body, sentence
 ):
     # A machine that stands still stops the arm, too.
-    monkeypatch.setattr(execution_monitor, 'LONGEST_WAIT', 30.0)
+    monkeypatch.setattr(step, 'LONGEST_WAIT', 30.0)
     planner, stranger = start(seed=3)
     say_all(planner, stranger, body_boxes=body())
     response = stranger.answer()

@@ -8,8 +8,6 @@ It fails closed: any error ends in a fail-safe stop by what was known before it.
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
-from functools import partial
 import math
 from threading import RLock
 import time
@@ -19,14 +17,11 @@ import numpy as np
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rrth_planner.execution.clock_watch import ClockWatch, watch_clock
-from rrth_planner.execution.decide import decide, LONGEST_WAIT
 from rrth_planner.execution.decision import Command, Decision, Line
 from rrth_planner.execution.event import (
     Begin,
     BodyCame,
-    BodyWaited,
     ClockStepped,
-    CommitmentTook,
     Event,
     Fail,
     Hold,
@@ -41,8 +36,9 @@ from rrth_planner.execution.event import (
 )
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.fail_safe_stop import pending
-from rrth_planner.execution.flight_recorder import Fate, FlightRecorder
+from rrth_planner.execution.flight_recorder import FlightRecorder
 from rrth_planner.execution.remaining_motion import is_ray_clear
+from rrth_planner.execution.step import Fate, following, Step, step_of
 from rrth_planner.execution.watch import Level, MonitorRules, MonitorState, Stop, Watch
 from rrth_planner.model.errors import one_line, RequestError
 from rrth_planner.model.goal import PointingGoal
@@ -119,20 +115,18 @@ class ExecutionMonitor:
                 raise RequestError(ErrorCode.PREEMPTED, 'the planner is shutting down')
             self._check_clock()
             event = Begin(self._moment(), planned, goal, parameters, joins, planned_from)
-            before, fate = self._watch, Fate.NONE
-            try:
-                decision = decide(before, event)
+
+            def send(command: Command) -> None:
                 publish()
-                self._publish(decision)
-                self._watch, fate = decision.watch, Fate.KEPT
-            finally:
-                command = decision.command if fate is Fate.KEPT else None
-                self._remember(before, event, fate, command)
+                self._publish(command)
+
+            before = self._watch
+            step = self._stepped(event, lambda: 0.0, send)
             # From here on the arm moves: an error must stop it.
-            self._run_fail_safe(lambda: self._report(before, decision, 0.0))
+            self._run_fail_safe(lambda: self._report(before, step.decision, 0.0))
             with suppress(Exception):
                 if not self._watch.is_doubted and not self._publishers.has_listener():
-                    self._take(NobodyListens)
+                    self._take(lambda: NobodyListens(self._moment()))
 
     def on_body(self, body: WearerBody, arrived: int, is_newest: bool = True) -> None:
         """
@@ -142,7 +136,8 @@ class ExecutionMonitor:
         """
         sights: list[Sight] = []
 
-        def came(at: Moment) -> BodyCame:
+        def came() -> BodyCame:
+            at = self._moment()
             if body is not self._seen and at.rules.separation is not None:
                 parts = (*body.parts, *body.lost)
                 measured = np.array([part.measured for _, part in parts for _ in part.boxes])
@@ -189,14 +184,14 @@ class ExecutionMonitor:
         A handover is planned from it; also the last motion after its end, since the controller
         holds that. Without separation it is the whole motion anyway. None: it is not known.
         """
-        self._run_fail_safe(lambda: self._take(lambda at: Hold(at, until)))
+        self._run_fail_safe(lambda: self._take(lambda: Hold(self._moment(), until)))
         return self._watch.tracked.command
 
     def take_stops(self) -> list[Stop]:
         """Return the stops published since the last call."""
         stops = list(self._watch.stops)
         if stops:
-            self._run_fail_safe(lambda: self._take(StopsTaken))
+            self._run_fail_safe(lambda: self._take(lambda: StopsTaken(self._moment())))
         return stops
 
     def reset(self) -> str:
@@ -206,12 +201,12 @@ class ExecutionMonitor:
         A motion that waits for that goes on: also one that was stopped and is planned anew.
         """
         fault = self._watch.commitments.fault
-        self._run_fail_safe(lambda: self._take(Reset))
+        self._run_fail_safe(lambda: self._take(lambda: Reset(self._moment())))
         return fault
 
     def report_hold(self, why: str) -> None:
         """Report that the arm stays where it came to rest."""
-        self._run_fail_safe(lambda: self._take(lambda at: Rest(at, why)))
+        self._run_fail_safe(lambda: self._take(lambda: Rest(self._moment(), why)))
 
     def close(self) -> None:
         """Stop the arm, which is no longer monitored, and end monitoring."""
@@ -238,66 +233,52 @@ class ExecutionMonitor:
 
     def _take(
         self,
-        happens: Callable[[Moment], Event],
+        happens: Callable[[], Event],
         arrived: int | None = None,
         published: float | None = None,
-        moment: Callable[[], Moment] | None = None,
     ) -> None:
         """
-        Take what happens: publish what is decided, keep it, report it, and decide what is next.
+        Take what happens, report it, and take what follows.
 
         arrived: when the body came that it is about [ns]; published: how long after its cause the
-        stop was that it is about [s]; moment: returns when it happens, by default now.
+        stop was that it is about [s].
         """
         # What it takes to see what is known counts, too: a commitment begins by that time.
-        begun, before, fate = time.perf_counter(), self._watch, Fate.NONE
-        event = happens(self._moment() if moment is None else moment())
-        command: Command | None = None
-        try:
-            decision = decide(before, event)
-            took, command = time.perf_counter() - begun, decision.command
-            decision, fate = self._carried_out(decision, took)
-            self._watch = decision.watch
-        finally:
-            self._remember(before, event, fate, command if fate is Fate.KEPT else None)
+        begun, before = time.perf_counter(), self._watch
+        step = self._stepped(happens(), lambda: time.perf_counter() - begun, self._publish)
+        decision = step.decision
         if decision.is_stop:
             # An error in the report must not undo the stop.
             with suppress(Exception):
-                published = self._waited(before, decision, took, arrived)
+                published = self._waited(before, decision, step.took, arrived)
                 self._report(before, decision, published)
         else:
-            self._report(before, decision, took if published is None else published)
-        if command is not None and command.within < math.inf:
-            self._take(lambda at: CommitmentTook(at, took), moment=lambda: event.at)
-        if decision.next is not None:
-            self._take(partial(_at, decision.next), arrived, published)
-        if decision.is_look_due:
-            body = self._inputs.body.value
-            self._take(lambda at: BodyCame(at, None, self._look(body, at)))
-        if decision.age is not None and arrived is not None:
-            waited = self._elapsed(arrived)
-            if waited > LONGEST_WAIT:
-                self._take(lambda at: BodyWaited(at, waited))
+            self._report(before, decision, step.took if published is None else published)
+        for then in following(
+            step,
+            self._moment,
+            lambda at: self._look(self._inputs.body.value, at),
+            lambda: 0.0 if arrived is None else self._elapsed(arrived),
+        ):
+            self._take(then, arrived, published)
+
+    def _stepped(
+        self, event: Event, took: Callable[[], float], publish: Callable[[Command], None]
+    ) -> Step:
+        """Publish what is decided about an event, keep it, and remember it."""
+        before, fate, published = self._watch, Fate.NONE, None
+        try:
+            step = step_of(before, event, took, publish)
+            self._watch = step.decision.watch
+            fate, published = step.fate, step.published
+        finally:
+            self._remember(before, event, fate, published)
+        return step
 
     def _remember(self, watch: Watch, event: Event, fate: Fate, command: Command | None) -> None:
         # What cannot be recorded is decided all the same.
         with suppress(Exception):
             self.flight.record(watch, event, fate, command)
-
-    def _carried_out(self, decision: Decision, took: float) -> tuple[Decision, Fate]:
-        """Publish what was decided in so long a time [s]; return what is to be kept."""
-        command = decision.command
-        if command is not None and took > command.within:
-            assert decision.otherwise is not None
-            return decision.otherwise, Fate.OTHERWISE
-        try:
-            self._publish(decision)
-        except Exception:
-            if decision.otherwise is None or command is None or command.within < math.inf:
-                raise
-            # A stop: it is tried again at the next check.
-            return replace(decision.otherwise, lines=(_error_line(),)), Fate.OTHERWISE
-        return decision, Fate.KEPT
 
     def _waited(
         self, before: Watch, decision: Decision, took: float, arrived: int | None
@@ -313,7 +294,7 @@ class ExecutionMonitor:
         event = Fail(self._moment_of_failure(), why, is_replanned, is_fault)
         before = self._watch
         try:
-            self._take(lambda _: event, moment=lambda: event.at)
+            self._take(lambda: event)
         except Exception:
             if self._watch is before:
                 self._watch = pending(before, event)
@@ -321,11 +302,9 @@ class ExecutionMonitor:
             with suppress(Exception):
                 self._node.get_logger().error(traceback.format_exc())
 
-    def _publish(self, decision: Decision) -> None:
-        command = decision.command
-        if command is not None:
-            motion = command.motion.trajectory
-            self._publishers.publish_motion(motion, command.rules, command.begin)
+    def _publish(self, command: Command) -> None:
+        motion = command.motion.trajectory
+        self._publishers.publish_motion(motion, command.rules, command.begin)
 
     def _report(self, before: Watch, decision: Decision, took: float) -> None:
         """Report what was decided in so long a time [s]: diagnostics, `~/state` and log."""
@@ -368,7 +347,7 @@ class ExecutionMonitor:
 
     def _check_periodically(self) -> None:
         self._check_clock()
-        self._take(Tick)
+        self._take(lambda: Tick(self._moment()))
         if self._watch.pending is None:
             self._publishers.assert_liveliness()
         if self._reporter.parameters.separates != NEVER:
@@ -387,7 +366,7 @@ class ExecutionMonitor:
             # How old things are does not change by a step.
             self._inputs.shift(found.step)
             step, sentence = found.step, found.sentence
-            self._take(lambda at: ClockStepped(at, step, sentence))
+            self._take(lambda: ClockStepped(self._moment(), step, sentence))
 
     def _moment(self) -> Moment:
         """Return the present, with what is known now."""
@@ -442,15 +421,6 @@ class ExecutionMonitor:
 
     def _now(self) -> float:
         return self._node.get_clock().now().nanoseconds / NANOSECONDS
-
-
-def _at(event: Event, at: Moment) -> Event:
-    """Return an event as it happens at a moment."""
-    return replace(event, at=at)
-
-
-def _error_line() -> Line:
-    return Line(Level.ERROR, traceback.format_exc())
 
 
 def _named(problem: Exception) -> str:

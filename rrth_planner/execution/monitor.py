@@ -1,29 +1,19 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The monitor in virtual time: the node's decisions, carried out as the node carries them out."""
+"""The monitor of any arm without ROS: the node's decisions, carried out as the node does."""
 
 from collections.abc import Callable
-from dataclasses import replace
 import hashlib
-import math
 
-from rrth_planner.execution.decide import decide, LONGEST_WAIT
-from rrth_planner.execution.decision import Command, Decision
-from rrth_planner.execution.event import (
-    BodyCame,
-    BodyWaited,
-    CommitmentTook,
-    Event,
-    Fail,
-    Look,
-    Moment,
-)
+from rrth_planner.execution.decision import Command
+from rrth_planner.execution.event import Event, Fail, Look, Moment
 from rrth_planner.execution.fail_safe_stop import pending
 from rrth_planner.execution.flight_recorder import digest_of
+from rrth_planner.execution.step import following, Step, step_of
 from rrth_planner.execution.watch import MonitorRules, Watch
 
 
-class VirtualMonitor:
+class Monitor:
     """
     Takes events, and sends what is decided.
 
@@ -86,40 +76,19 @@ class VirtualMonitor:
 
     def _take(self, event: Event, waited: float) -> None:
         self.n_events += 1
-        took, decision = self._takes(), decide(self.watch, event)
-        # Also of one that is too late to be published.
-        command = decision.command
-        decision = self._carried_out(decision, took)
-        self.watch = decision.watch
-        self._note(event, decision)
-        if took and command is not None and command.within < math.inf:
-            self._take(CommitmentTook(event.at, took), 0.0)
-        if decision.next is not None:
-            self._take(replace(decision.next, at=self._moment()), waited)
-        if decision.is_look_due:
-            self._take(BodyCame(self._moment(), None, self._look()), 0.0)
-        if decision.age is not None and waited + took > LONGEST_WAIT:
-            self._take(BodyWaited(self._moment(), waited + took), 0.0)
+        took = self._takes()
+        step = step_of(self.watch, event, lambda: took, self._send)
+        self.watch = step.decision.watch
+        self._note(step)
+        looked = self._look
+        for happens in following(step, self._moment, lambda _: looked(), lambda: waited + took):
+            self._take(happens(), waited)
 
-    def _carried_out(self, decision: Decision, took: float) -> Decision:
-        command = decision.command
-        if command is None:
-            return decision
-        if took > command.within:
-            assert decision.otherwise is not None
-            return decision.otherwise
-        try:
-            self._send(command)
-        except Exception:
-            if decision.otherwise is None or command.within < math.inf:
-                raise
-            # A stop: it is tried again at the next check.
-            return decision.otherwise
-        return decision
-
-    def _note(self, event: Event, decision: Decision) -> None:
+    def _note(self, step: Step) -> None:
+        decision = step.decision
         self.n_stops += decision.is_stop
-        self._digest.update(f'{type(event).__name__} {decision.watch.state.value}\n'.encode())
-        if decision.command is not None:
+        state = decision.watch.state.value
+        self._digest.update(f'{type(step.event).__name__} {state}\n'.encode())
+        if step.published is not None:
             self.n_commands += 1
-            self._digest.update(digest_of(decision.command))
+            self._digest.update(digest_of(step.published))
