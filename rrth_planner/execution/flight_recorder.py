@@ -97,10 +97,11 @@ class Replayed:
 
 
 class FlightRecorder:
-    """Keeps the events of the last `MEMORY` seconds."""
+    """Keeps the events of the last seconds."""
 
-    def __init__(self) -> None:
-        """Begin with nothing."""
+    def __init__(self, memory: float = MEMORY) -> None:
+        """Begin with nothing; memory: how long it remembers [s]."""
+        self._memory = memory
         self._segments: deque[tuple[float, Watch, list[Entry]]] = deque()
         self._rules: list[MonitorRules] = []
 
@@ -109,7 +110,7 @@ class FlightRecorder:
         now = event.at.steady
         if not self._segments or now - self._segments[-1][0] >= SEGMENT:
             self._segments.append((now, watch, []))
-            while now - self._segments[0][0] > MEMORY + SEGMENT:
+            while now - self._segments[0][0] > self._memory + SEGMENT:
                 self._segments.popleft()
         digest = b'' if command is None else digest_of(command)
         self._segments[-1][2].append(Entry(_light(event), fate, digest))

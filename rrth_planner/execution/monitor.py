@@ -8,8 +8,8 @@ import hashlib
 from rrth_planner.execution.decision import Command
 from rrth_planner.execution.event import Event, Fail, Look, Moment
 from rrth_planner.execution.fail_safe_stop import pending
-from rrth_planner.execution.flight_recorder import digest_of
-from rrth_planner.execution.step import following, Step, step_of
+from rrth_planner.execution.flight_recorder import digest_of, FlightRecorder
+from rrth_planner.execution.step import Fate, following, Step, step_of
 from rrth_planner.execution.watch import MonitorRules, Watch
 
 
@@ -27,6 +27,8 @@ class Monitor:
         Publishes a command; raises where it cannot.
     takes : callable
         Returns how long a decision takes [s].
+    flight : FlightRecorder, optional
+        Records the events.
 
     """
 
@@ -37,10 +39,12 @@ class Monitor:
         look: Callable[[], Look | None],
         send: Callable[[Command], None],
         takes: Callable[[], float] = lambda: 0.0,
+        flight: FlightRecorder | None = None,
     ) -> None:
         """Begin with no motion."""
         self.watch = Watch(rules=rules, motion_topic='/joint_trajectory')
         self._moment, self._look, self._send, self._takes = moment, look, send, takes
+        self.flight = flight or FlightRecorder()
         self._digest = hashlib.sha256()
         self.n_events = self.n_commands = self.n_stops = 0
 
@@ -73,11 +77,17 @@ class Monitor:
         except Exception:
             if self.watch is before:
                 self.watch = pending(before, event)
+                self.flight.record(before, event, Fate.PENDING, None)
 
     def _take(self, event: Event, waited: float) -> None:
         self.n_events += 1
-        took = self._takes()
-        step = step_of(self.watch, event, lambda: took, self._send)
+        took, before = self._takes(), self.watch
+        try:
+            step = step_of(before, event, lambda: took, self._send)
+        except Exception:
+            self.flight.record(before, event, Fate.NONE, None)
+            raise
+        self.flight.record(before, event, step.fate, step.published)
         self.watch = step.decision.watch
         self._note(step)
         looked = self._look

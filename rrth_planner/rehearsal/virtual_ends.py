@@ -8,7 +8,6 @@ from pathlib import Path
 
 from rrth_planner.execution.event import Begin, Hold, Rest, StopsTaken
 from rrth_planner.execution.executing_motion import ExecutingMotion
-from rrth_planner.execution.flight_recorder import FlightRecorder
 from rrth_planner.execution.joint_reading import JointReading
 from rrth_planner.execution.watch import MonitorRules, Stop, Watch
 from rrth_planner.model.arrays import Array
@@ -91,7 +90,7 @@ class MonitorEnd:
 
     def __init__(self, world: World) -> None:
         """Execute motions in a world."""
-        self._world, self.flight = world, FlightRecorder()
+        self._world, self.flight = world, world.monitor.flight
 
     @property
     def watch(self) -> Watch:

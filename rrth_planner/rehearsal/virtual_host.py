@@ -19,7 +19,7 @@ T = TypeVar('T')
 GRACE = 5.0
 # A plan has as long as it needs: what a clock ends differs from run to run [s].
 UNLIMITED = 3600.0
-# The second checker answers after so long [s].
+# The second checker answers after so long, if nothing else is said [s].
 CHECKING = 0.002
 
 
@@ -39,6 +39,8 @@ class VirtualHost:
         Has the messages processed that have come.
     new_seed : callable
         Returns the seed of a plan that was given none.
+    checking : float
+        How long the second checker takes to answer [s].
 
     """
 
@@ -51,11 +53,13 @@ class VirtualHost:
         stands_until: Callable[[], float] = lambda: -math.inf,
         read: Callable[[], None] = lambda: None,
         new_seed: Callable[[], int] = lambda: 0,
+        checking: float = CHECKING,
     ) -> None:
         """Begin with no coroutine."""
         self._timeline, self._planner = timeline, planner
         self._latency, self._is_dead = latency, is_dead
         self._stands_until, self._read, self._new_seed = stands_until, read, new_seed
+        self._checking = checking
         self._coroutines = Coroutines(self.now, self._wake)
         # When they are gone on with next [s].
         self._due = math.inf
@@ -101,7 +105,7 @@ class VirtualHost:
     async def violation_seen(self, *arguments: Any) -> Violation | None:
         """Do what `Planner.violation_seen` does."""
         violation = self._planner.violation_seen(*arguments)
-        await self.sleep(CHECKING)
+        await self.sleep(self._checking)
         return violation
 
     def begin(self, coroutine: Coroutine[Any, Any, object]) -> None:

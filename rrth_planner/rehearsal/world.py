@@ -15,6 +15,7 @@ from typing import Protocol
 import numpy as np
 from rrth_planner.execution.decision import Command
 from rrth_planner.execution.event import BodyCame, Event, Look, Moment, Sight, Tick
+from rrth_planner.execution.flight_recorder import FlightRecorder
 from rrth_planner.execution.joint_reading import JointReading, with_earlier
 from rrth_planner.execution.monitor import Monitor
 from rrth_planner.execution.recent_wearer import RecentWearer
@@ -112,13 +113,25 @@ class World:
         controller: ControllerRules = DEFAULT_RULES,
         controller_period: float = 0.005,
         lag: float = 0.0,
+        begin: float = BEGIN,
+        is_drawn: bool = True,
+        deciding: Callable[[], float] | None = None,
+        flight: FlightRecorder | None = None,
     ) -> None:
-        """Place the arm at rest at q, (dof,) [rad]."""
+        """
+        Place the arm at rest at q, (dof,) [rad], at a time [s].
+
+        is_drawn: whether what happens is drawn; else `frame_came`, `joints_came` and `check` are
+        called by whoever knows what happened. deciding: returns how long a decision takes [s];
+        None: that is drawn, too.
+        """
         self.rules, self.wearer, self.wire = rules, wearer, wire
         self.rng = np.random.default_rng(seed)
-        self.timeline = Timeline(BEGIN)
-        self.arm = LaggingArm(q, controller_period, lag, controller, BEGIN)
-        self.monitor = Monitor(rules, self.moment, self.look, self.send, self._deciding)
+        self.timeline = Timeline(begin)
+        self.arm = LaggingArm(q, controller_period, lag, controller, begin)
+        self.monitor = Monitor(
+            rules, self.moment, self.look, self.send, deciding or self._deciding, flight
+        )
         # Until when the host stands still, the middleware fails, frames are lost and the
         # controller rejects what it is given [s].
         self.stands_until = self.fails_until = self.blind_until = self.rejects_until = -math.inf
@@ -145,10 +158,12 @@ class World:
         self.arrived: Command | None = None
         # Bodies that came while the host stood still.
         self._waiting: list[tuple[float, tuple[Box, ...], float]] = []
+        if not is_drawn:
+            return
         timeline, rng = self.timeline, self.rng
         timeline.every(controller_period, self._cycle)
         timeline.every(JOINT_PERIOD, self._read, float(rng.uniform(0.0, JOINT_PERIOD)))
-        timeline.every(CHECK_PERIOD, self._check, float(rng.uniform(0.0, CHECK_PERIOD)))
+        timeline.every(CHECK_PERIOD, self.check, float(rng.uniform(0.0, CHECK_PERIOD)))
         timeline.every(wire.frame_period, self._frame)
 
     def moment(self) -> Moment:
@@ -233,15 +248,22 @@ class World:
             self.on_join(arm.time, commanded_state(before, due), setpoint)
         self.on_setpoint(arm.time, setpoint)
 
+    def joints_came(self, reading: JointReading) -> None:
+        """Have joint positions come now."""
+        self._reading = reading
+
     def _read(self) -> None:
         if self.is_still:
             return
         now = self.timeline.now
         state = self.arm.measured_at(now)
         recent = with_earlier(state.positions, now, self._reading)
-        self._reading = JointReading(state.positions, state.velocities, now, now, math.inf, recent)
+        self.joints_came(
+            JointReading(state.positions, state.velocities, now, now, math.inf, recent)
+        )
 
-    def _check(self) -> None:
+    def check(self) -> None:
+        """Have the monitor check what it knows."""
         if not self.is_still:
             self.read()
             self.monitor.take(Tick(self.moment()))
@@ -263,12 +285,13 @@ class World:
         )
         if not seen:
             return
-        self.timeline.after(age, lambda: self._body_came(seen, now))
+        self.timeline.after(age, lambda: self.frame_came(seen, now))
         if wire.doubled and self.rng.random() < wire.doubled:
             again = float(self.rng.uniform(*wire.age))
-            self.timeline.after(again, lambda: self._body_came(seen, now))
+            self.timeline.after(again, lambda: self.frame_came(seen, now))
 
-    def _body_came(self, seen: tuple[Box, ...], measured: float) -> None:
+    def frame_came(self, seen: tuple[Box, ...], measured: float) -> None:
+        """Have the parts that were seen at a time [s] come now."""
         self._waiting.append((self.timeline.now, seen, measured))
         if not self.is_still:
             self.read()
