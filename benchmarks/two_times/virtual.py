@@ -1,0 +1,158 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The same course in virtual time: what came, and how late everything was, is as recorded."""
+
+from bisect import bisect_left
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from functools import partial
+import math
+
+import numpy as np
+from rrth_planner.execution import event as events
+from rrth_planner.execution.command import ahead
+from rrth_planner.execution.flight_recorder import FlightRecorder, read_flight, replay, Replayed
+from rrth_planner.execution.handover import LATE, LEADS
+from rrth_planner.io.settings import load_settings
+from rrth_planner.model.goal import PointingGoal
+from rrth_planner.pipeline.in_process_planner import InProcessPlanner
+from rrth_planner.rehearsal.parameters import RehearsedParameters
+from rrth_planner.rehearsal.rehearsal import (
+    BODY_TIMEOUT,
+    JOINT_TIMEOUT,
+    PATIENCE,
+    START_TOLERANCE,
+)
+from rrth_planner.rehearsal.virtual_ends import LastWord, MonitorEnd, NoPublishers, VirtualInputs
+from rrth_planner.rehearsal.virtual_host import VirtualHost
+from rrth_planner.rehearsal.world import Wire, World
+from rrth_planner.requests.outcome import Outcome
+from rrth_planner.requests.request_queue import PERIOD, PlanQueue
+
+from benchmarks.two_times.real import Course, SEED
+
+# How long a request takes to the planner where nothing says it [s].
+WAY = 0.002
+# An attempt of the planner is the recorded one that began within so long [s].
+NEAR = 0.02
+# How long a plan takes that was not recorded [s].
+USUAL = 0.02
+KEEP_LOST = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """One plan: when it was begun, and when its motion, or nothing, followed [s]."""
+
+    begin: float
+    end: float
+
+
+def attempts_of(recorded: Sequence[Replayed], delay: float) -> list[Attempt]:
+    """Return when plans were begun and ended, by what the monitor was told."""
+    found, begin = [], math.nan
+    for one in recorded:
+        event = one.event
+        is_hold = isinstance(event, events.Hold)
+        if not math.isnan(begin) and (
+            isinstance(event, events.Begin) or (is_hold and event.until < math.inf)
+        ):
+            found.append(Attempt(begin, event.at.now))
+            begin = math.nan
+        if is_hold and math.isfinite(event.until):
+            # The longer leads are for what took too long.
+            starts = [event.until - LATE - ahead(delay) - lead for lead in LEADS]
+            begin = min(starts, key=lambda start: abs(start - event.at.now))
+    return found
+
+
+def again(course: Course) -> tuple[list[Replayed], list[Outcome]]:
+    """Return what the monitor decides in virtual time, and how requests end there."""
+    rules, recorded = course.rules, course.events
+    delay = rules.controller_delay
+    settings = load_settings(rules.arm.dof, seed=SEED)
+    parameters = RehearsedParameters(
+        **{field.name: getattr(settings, field.name) for field in fields(settings)},
+        arm=rules.arm,
+        stop_limits=rules.stop_limits,
+        execution=rules.execution,
+        body_timeout=BODY_TIMEOUT,
+        joint_timeout=JOINT_TIMEOUT,
+        keep_lost=KEEP_LOST,
+        patience=PATIENCE,
+        start_tolerance=START_TOLERANCE,
+    )
+    took = {
+        one.event.at.now: one.event.took
+        for one in recorded
+        if isinstance(one.event, events.CommitmentTook)
+    }
+    first = recorded[0].event.at
+    reading = next(one.event.at.reading for one in recorded if one.event.at.reading is not None)
+    flight = FlightRecorder(math.inf)
+    world = World(
+        *(parameters, Nobody(), reading.positions, 0, Wire(keep_lost=KEEP_LOST)),
+        begin=first.now - 1.0,
+        is_drawn=False,
+        deciding=lambda: took.get(world.timeline.now, 0.0),
+        flight=flight,
+    )
+    timeline, attempts = world.timeline, attempts_of(recorded, delay)
+    begins = [one.begin for one in attempts]
+
+    def latency() -> float:
+        # The plan was asked for a moment ago.
+        k = bisect_left(begins, timeline.now)
+        near = min(attempts[max(0, k - 1) : k + 1], key=lambda one: abs(one.begin - timeline.now))
+        is_known = abs(near.begin - timeline.now) < NEAR
+        return near.end - near.begin if is_known else USUAL
+
+    host = VirtualHost(timeline, InProcessPlanner(), latency, read=world.read, checking=0.0)
+    queue = PlanQueue(
+        *(host, VirtualInputs(world), LastWord(parameters), NoPublishers(), MonitorEnd(world))
+    )
+    _schedule(world, recorded)
+    outcomes: list[Outcome] = []
+
+    async def ask(goal: PointingGoal) -> None:
+        outcomes.append(await queue.respond(goal))
+
+    for sent, target in course.asked:
+        k = bisect_left(begins, sent)
+        is_at_once = k < len(begins) and begins[k] < sent + 10.0 * WAY
+        came = begins[k] if is_at_once else sent + WAY
+        timeline.at(came, partial(host_begin, host, ask, PointingGoal(target)))
+    timeline.every(PERIOD, queue.follow_up, first=1.0)
+    timeline.run(recorded[-1].event.at.now)
+    return list(replay(read_flight(flight.to_bytes()))), outcomes
+
+
+def host_begin(host: VirtualHost, ask: object, goal: PointingGoal) -> None:
+    """Have a request run."""
+    host.begin(ask(goal))  # type: ignore[operator]
+
+
+class Nobody:
+    """Whoever is seen is recorded."""
+
+    names: tuple[str, ...] = ()
+
+    def rows_at(self, time: float) -> np.ndarray:
+        """Return no box."""
+        return np.zeros((0, 15))
+
+
+def _schedule(world: World, recorded: Sequence[Replayed]) -> None:
+    """Have happen what was recorded, but for what the planner did by itself."""
+    taken = -math.inf
+    for one in recorded:
+        event = one.event
+        reading = event.at.reading
+        if reading is not None and reading.taken > taken:
+            taken = reading.taken
+            world.timeline.at(reading.received, partial(world.joints_came, reading))
+        if isinstance(event, events.BodyCame) and event.sight is not None:
+            boxes, measured = event.sight.scene.boxes, float(event.sight.measured.max())
+            world.timeline.at(event.at.now, partial(world.frame_came, boxes, measured))
+        elif isinstance(event, events.Tick):
+            world.timeline.at(event.at.now, world.check)
