@@ -103,7 +103,9 @@ def idle(rules=RULES):
 def begun(watch, motion, at, rules=RULES):
     """Return a watch after a planned motion has begun at rest, and the motion."""
     planned = ExecutingMotion(trajectory=motion, start_time=at.now)
-    found = decide(watch, events.Begin(at, planned, GOAL, rules, float('inf'), None))
+    counts = watch.n_stops, watch.n_faults
+    begin = events.Begin(at, planned, GOAL, rules, float('inf'), None, *counts)
+    found = decide(watch, begin)
     return found.watch, found.command.motion
 
 

@@ -246,7 +246,9 @@ class Episode:
     ) -> bool:
         world = self.world
         planned = ExecutingMotion(trajectory=motion, start_time=begin)
-        event = Begin(world.moment(), planned, GOAL, world.rules, joins, planned_from)
+        watch = world.monitor.watch
+        counts = watch.n_stops, watch.n_faults
+        event = Begin(world.moment(), planned, GOAL, world.rules, joins, planned_from, *counts)
         self.judge.is_beginning = True
         try:
             world.monitor.begin(event)

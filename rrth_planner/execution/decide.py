@@ -142,6 +142,14 @@ def decide(watch: Watch, event: Event) -> Decision:
 
 def _begun(watch: Watch, event: events.Begin) -> Decision:
     at, rules = event.at, event.rules
+    if event.n_faults != watch.n_faults:
+        raise RequestError(
+            ErrorCode.FAILURE, f'an error while the motion was planned: {watch.stop_reason}'
+        )
+    if event.n_stops != watch.n_stops:
+        raise RequestError(
+            INVALIDATED, f'the arm was stopped while its motion was planned: {watch.stop_reason}'
+        )
     if at.steady < watch.settles:
         raise RequestError(
             INVALIDATED,

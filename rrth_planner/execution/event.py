@@ -146,6 +146,9 @@ class Begin(Event):
         is commanded until then is not known.
     planned_from : ExecutingMotion or None
         What was commanded when it was planned, where that counts.
+    n_stops, n_faults : int
+        Those of the watch when the motion was planned, and when it was asked for: after another
+        one it does not begin.
 
     """
 
@@ -154,6 +157,8 @@ class Begin(Event):
     rules: MonitorRules
     joins: float | None
     planned_from: ExecutingMotion | None
+    n_stops: int
+    n_faults: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)

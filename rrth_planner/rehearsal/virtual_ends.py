@@ -105,13 +105,16 @@ class MonitorEnd:
         planned: ExecutingMotion,
         goal: PointingGoal,
         parameters: MonitorRules,
+        n_stops: int,
+        n_faults: int,
         publish: Callable[[], None] = lambda: None,
         joins: float | None = math.inf,
         planned_from: ExecutingMotion | None = None,
     ) -> None:
         """Have a motion executed, or raise RequestError."""
         world = self._world
-        world.monitor.begin(Begin(world.moment(), planned, goal, parameters, joins, planned_from))
+        at, counts = world.moment(), (n_stops, n_faults)
+        world.monitor.begin(Begin(at, planned, goal, parameters, joins, planned_from, *counts))
 
     def hold(self, until: float) -> ExecutingMotion | None:
         """Return what the arm is commanded, which does not change until a time [s]."""

@@ -39,11 +39,17 @@ class MotionMonitor(Protocol):
         planned: ExecutingMotion,
         goal: PointingGoal,
         parameters: MonitorRules,
+        n_stops: int,
+        n_faults: int,
         publish: Callable[[], None] = lambda: None,
         joins: float | None = math.inf,
         planned_from: ExecutingMotion | None = None,
     ) -> None:
-        """Have a motion executed, or raise RequestError; publish: shows the planned motion."""
+        """
+        Have a motion executed, or raise RequestError.
+
+        n_stops, n_faults: as in `execution.event.Begin`; publish: shows the planned motion.
+        """
 
     def hold(self, until: float) -> ExecutingMotion | None:
         """Return what the arm is commanded, which does not change until a time [s]."""

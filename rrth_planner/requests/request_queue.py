@@ -301,12 +301,7 @@ class PlanQueue:
                 show = self._publishers.prepared(outcome.trajectory, revalidation.parameters)
                 await self._host.read()
                 # From here on nothing is awaited: no message comes in between.
-                if monitor.watch.n_faults != n_faults:
-                    raise RequestError(
-                        ErrorCode.FAILURE,
-                        f'an error while the motion was planned: {monitor.watch.stop_reason}',
-                    )
-                return self._publish(ticket, outcome, revalidation, n_stops, show)
+                return self._publish(ticket, outcome, revalidation, (n_stops, n_faults), show)
 
             outcome = await plan_request(
                 self._host,
@@ -381,22 +376,18 @@ class PlanQueue:
         ticket: _Ticket,
         outcome: Outcome,
         revalidation: Revalidation,
-        n_stops: int,
+        counts: tuple[int, int],
         show: Callable[[float], None],
     ) -> Outcome | None:
         """
         Publish the motion of a request, and have it monitored; return the outcome with its stamp.
 
-        None where it is too late; raise RequestError where it is no longer valid.
+        None where it is too late; raise RequestError where it is no longer valid. counts: of stops
+        and faults, as in `execution.event.Begin`.
         """
         monitor, parameters = self._monitor, revalidation.parameters
         require_not_cancelled(lambda: ticket.is_cancelled)
         self._require_same_source(parameters)
-        if n_stops != monitor.watch.n_stops:
-            raise RequestError(
-                ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
-                f'the arm was stopped while its motion was planned: {monitor.watch.stop_reason}',
-            )
         revalidation.require_fit()
         if revalidation.is_late():
             return None
@@ -415,6 +406,7 @@ class PlanQueue:
             planned,
             snapshot.goal,
             parameters,
+            *counts,
             lambda: show(planned.start_time),
             math.inf if handover is None else handover.joins,
             None if handover is None else handover.before,

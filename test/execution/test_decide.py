@@ -25,6 +25,7 @@ from rrth_planner.execution import decide as module, event as events, fail_safe_
 from rrth_planner.execution.decide import decide
 from rrth_planner.execution.watch import MonitorState, PendingStop, Watch
 from rrth_planner.model.errors import RequestError
+from rrth_planner.model.status import ErrorCode
 from same_values import differences
 
 MOTION = turn()
@@ -107,12 +108,11 @@ def happening(name, state):
         for at in moments(motion, state):
             near = hand(MOTION, at.now - BEGIN + 0.6) if at.now < END else hand(MOTION, 0.5)
             words = {
-                'Begin': lambda at=at: (
+                'Begin': lambda at=at, watch=watch: (
                     replace(monitoring()[1], start_time=at.now, trajectory=MOTION),
                     GOAL,
                     Rules(),
-                    None,
-                    None,
+                    *(None, None, watch.n_stops, watch.n_faults),
                 ),
                 'BodyCame': lambda at=at: (body(at).sight, body(at).look),
                 'BodyWaited': lambda: (0.08,),
@@ -243,11 +243,28 @@ def test_an_error_at_rest_counts_for_what_is_planned_meanwhile(is_fault):
     assert found.state is MonitorState.IDLE
 
 
+@pytest.mark.parametrize(
+    ('counts', 'code', 'sentence'),
+    [
+        ((1, 0), ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE, 'was stopped while'),
+        ((0, 1), ErrorCode.FAILURE, 'an error while the motion was planned'),
+    ],
+)
+def test_what_was_planned_before_a_stop_or_a_fault_does_not_begin_after_it(counts, code, sentence):
+    watch, motion = monitoring()
+    stops, faults = watch.n_stops - counts[0], watch.n_faults - counts[1]
+    planned = replace(motion, start_time=WITHIN)
+    begin = events.Begin(on(motion, WITHIN), planned, GOAL, Rules(), None, None, stops, faults)
+    with pytest.raises(RequestError, match=sentence) as caught:
+        decide(watch, begin)
+    assert caught.value.code is code
+
+
 def test_no_motion_begins_while_a_stop_is_to_be_published():
     watch, motion = monitoring()
     at = on(motion, WITHIN)
     kept = decide(watch, events.Fail(at, 'of the test', True, False)).otherwise.watch
     planned = replace(motion, start_time=WITHIN)
-    begin = events.Begin(at, planned, GOAL, Rules(), None, None)
+    begin = events.Begin(at, planned, GOAL, Rules(), None, None, kept.n_stops, kept.n_faults)
     with pytest.raises(RequestError, match='could not be published: of the test'):
         decide(kept, begin)

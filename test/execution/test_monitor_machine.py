@@ -141,7 +141,8 @@ class Monitor(RuleBasedStateMachine):
         still = np.zeros_like(positions)
         curve = Trajectory(MOTION.times, positions, still, still)
         planned = ExecutingMotion(trajectory=curve, start_time=self.now + DELAY + 0.0025)
-        event = events.Begin(self.at(), planned, GOAL, self.rules, float('inf'), None)
+        counts = self.watch.n_stops, self.watch.n_faults
+        event = events.Begin(self.at(), planned, GOAL, self.rules, float('inf'), None, *counts)
         before = self.motion
         try:
             self.motion = None

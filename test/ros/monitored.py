@@ -98,7 +98,8 @@ class Monitored:
     def command(self, running, publish=lambda: None, joins=math.inf):
         """Command a motion; joins: when it begins within the one before [s], inf: at rest."""
         goal = PointingGoal(np.ones(3))
-        self.monitor.begin(running, goal, self.reporter.parameters, publish, joins)
+        counts = self.monitor.watch.n_stops, self.monitor.watch.n_faults
+        self.monitor.begin(running, goal, self.reporter.parameters, *counts, publish, joins)
 
     def on_time(self, phase):
         """Return positions and velocities of an arm that follows."""

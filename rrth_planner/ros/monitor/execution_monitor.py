@@ -93,6 +93,8 @@ class ExecutionMonitor:
         planned: ExecutingMotion,
         goal: PointingGoal,
         parameters: MonitorRules,
+        n_stops: int,
+        n_faults: int,
         publish: Callable[[], None] = lambda: None,
         joins: float | None = math.inf,
         planned_from: ExecutingMotion | None = None,
@@ -114,7 +116,8 @@ class ExecutionMonitor:
             if self._is_closed:
                 raise RequestError(ErrorCode.PREEMPTED, 'the planner is shutting down')
             self._check_clock()
-            event = Begin(self._moment(), planned, goal, parameters, joins, planned_from)
+            at, counts = self._moment(), (n_stops, n_faults)
+            event = Begin(at, planned, goal, parameters, joins, planned_from, *counts)
 
             def send(command: Command) -> None:
                 publish()
