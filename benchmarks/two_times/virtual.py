@@ -3,10 +3,11 @@
 """The same course in virtual time: what came, and how late everything was, is as recorded."""
 
 from bisect import bisect_left
-from collections.abc import Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from dataclasses import dataclass, fields
 from functools import partial
 import math
+from typing import Any
 
 import numpy as np
 from rrth_planner.execution import event as events
@@ -66,11 +67,17 @@ def attempts_of(recorded: Sequence[Replayed], delay: float) -> list[Attempt]:
     return found
 
 
-def again(course: Course) -> tuple[list[Replayed], list[Outcome]]:
-    """Return what the monitor decides in virtual time, and how requests end there."""
+def again(
+    course: Course, seed: int = SEED, new_seed: Callable[[], int] = lambda: 0
+) -> tuple[list[Replayed], list[Outcome]]:
+    """
+    Return what the monitor decides in virtual time, and how requests end there.
+
+    seed: of all plans; -1: each has a new one.
+    """
     rules, recorded = course.rules, course.events
     delay = rules.controller_delay
-    settings = load_settings(rules.arm.dof, seed=SEED)
+    settings = load_settings(rules.arm.dof, seed=seed)
     parameters = RehearsedParameters(
         **{field.name: getattr(settings, field.name) for field in fields(settings)},
         arm=rules.arm,
@@ -107,7 +114,12 @@ def again(course: Course) -> tuple[list[Replayed], list[Outcome]]:
         is_known = abs(near.begin - timeline.now) < NEAR
         return near.end - near.begin if is_known else USUAL
 
-    host = VirtualHost(timeline, InProcessPlanner(), latency, read=world.read, checking=0.0)
+    host = VirtualHost(
+        *(timeline, InProcessPlanner(), latency),
+        read=world.read,
+        new_seed=new_seed,
+        checking=0.0,
+    )
     queue = PlanQueue(
         *(host, VirtualInputs(world), LastWord(parameters), NoPublishers(), MonitorEnd(world))
     )
@@ -121,15 +133,25 @@ def again(course: Course) -> tuple[list[Replayed], list[Outcome]]:
         k = bisect_left(begins, sent)
         is_at_once = k < len(begins) and begins[k] < sent + 10.0 * WAY
         came = begins[k] if is_at_once else sent + WAY
-        timeline.at(came, partial(host_begin, host, ask, PointingGoal(target)))
-    timeline.every(PERIOD, queue.follow_up, first=1.0)
+        timeline.at(came, partial(_begin, host, ask, PointingGoal(target)))
+    timeline.every(PERIOD, queue.follow_up, _first_follow_up(recorded) - timeline.now)
     timeline.run(recorded[-1].event.at.now)
     return list(replay(read_flight(flight.to_bytes()))), outcomes
 
 
-def host_begin(host: VirtualHost, ask: object, goal: PointingGoal) -> None:
-    """Have a request run."""
-    host.begin(ask(goal))  # type: ignore[operator]
+def _begin(
+    host: VirtualHost,
+    ask: Callable[[PointingGoal], Coroutine[Any, Any, None]],
+    goal: PointingGoal,
+) -> None:
+    host.begin(ask(goal))
+
+
+def _first_follow_up(recorded: Sequence[Replayed]) -> float:
+    """Return when requests were first followed up, as far as that is known [s]."""
+    first = recorded[0].event.at.now
+    taken = [o.event.at.now for o in recorded if isinstance(o.event, events.StopsTaken)]
+    return first + math.fmod(taken[0] - first, PERIOD) if taken else first
 
 
 class Nobody:

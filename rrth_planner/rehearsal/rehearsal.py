@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from rrth_planner.execution.commitments import ExecutionRules
+from rrth_planner.execution.flight_recorder import FlightRecorder
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.motion_capture_file import load_person
 from rrth_planner.io.settings import load_settings
@@ -77,11 +78,18 @@ class Rehearsal:
         return found
 
 
-def rehearsed(scenario: Scenario, is_drawn: bool = False) -> Rehearsal:
+def rehearsed(
+    scenario: Scenario, is_drawn: bool = False, flight: FlightRecorder | None = None
+) -> Rehearsal:
     """
     Return what is seen of a scenario in virtual time.
 
-    is_drawn: whether to measure how far the nearest part of the wearer is, for pictures.
+    Parameters
+    ----------
+    is_drawn : bool
+        Whether to measure how far the nearest part of the wearer is, for pictures.
+    flight : FlightRecorder, optional
+        Records the events of the monitor.
 
     Raises
     ------
@@ -134,6 +142,7 @@ def rehearsed(scenario: Scenario, is_drawn: bool = False) -> Rehearsal:
         controller=ControllerRules(version=ControllerVersion(execution.version)),
         controller_period=execution.period,
         lag=execution.lag,
+        flight=flight,
     )
     witness = Witness(world, person, is_drawn)
     if isinstance(person, InterceptingWearer):
