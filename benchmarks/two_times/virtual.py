@@ -50,7 +50,7 @@ class Attempt:
 
 
 def attempts_of(recorded: Sequence[Replayed], delay: float) -> list[Attempt]:
-    """Return when plans were begun and ended, by what the monitor was told."""
+    """Return when plans were begun and ended, by the events of the monitor."""
     found, begin = [], math.nan
     for one in recorded:
         event = one.event
