@@ -16,7 +16,6 @@ from rrth_planner.execution.watch import Watch
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.separation import Separation
 from rrth_planner.model.trajectory import MotionLimits, sample, Trajectory
 import worlds
 
@@ -36,19 +35,9 @@ class Rules:
     margin: float = 0.02
     ray_guard_length: float = 1.0
     stop_limits: MotionLimits = worlds.limits()
-    controller_delay: float = 0.0
-    rest_speed: float = 0.01
-    separation: Separation | None = None
-    is_manual: bool = False
+    execution: ExecutionRules = ExecutionRules(None, 0.0, False)
     stands_still: bool = False
     replan: bool = True
-
-    @property
-    def execution(self):
-        """How a motion is executed."""
-        return ExecutionRules(
-            self.separation, self.controller_delay, self.rest_speed, self.is_manual
-        )
 
 
 RULES = Rules()

@@ -22,6 +22,7 @@ from typing import Any, cast
 import numpy as np
 from rclpy.node import Node
 from rrth_planner.execution.command import ahead
+from rrth_planner.execution.commitments import ExecutionRules
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.joint_reading import JointReading
 from rrth_planner.io.wearer_file import load_body
@@ -130,8 +131,7 @@ def _parameters_of(case: Case) -> PlannerParameters:
     if not case.is_separated:
         return replace(
             given,
-            separation=None,
-            controller_delay=delay,
+            execution=ExecutionRules(None, delay, False),
             body_timeout=0.0,
             joint_timeout=0.0,
             replan=False,
@@ -145,8 +145,7 @@ def _parameters_of(case: Case) -> PlannerParameters:
     )
     return replace(
         given,
-        separation=separation,
-        controller_delay=delay,
+        execution=ExecutionRules(separation, delay, False),
         body_timeout=0.2,
         joint_timeout=0.2,
         replan=False,
@@ -396,7 +395,7 @@ class _Session:
         assert trajectory is not None and plan is not None and snapshot is not None
         handover, parameters = outcome.handover, revalidation.parameters
         self._kind = BEGIN if handover is None else HANDOVER
-        start = self._clock() + ahead(parameters.controller_delay)
+        start = self._clock() + ahead(parameters.execution.controller_delay)
         self._monitor.begin(
             ExecutingMotion(
                 trajectory=trajectory,

@@ -49,7 +49,7 @@ class Episode:
         lag = float(rng.choice([0.0, 0.004]))
         case = Case(stop=str(rng.choice(['4/40', '10/400'])), controller_delay=delay)
         self._separation = separation_of(case)
-        execution = ExecutionRules(self._separation, delay, 0.01, bool(rng.random() < 0.2))
+        execution = ExecutionRules(self._separation, delay, bool(rng.random() < 0.2))
         rules = PlainRules(
             arm=the_arm(),
             margin=MARGIN,
@@ -234,7 +234,7 @@ class Episode:
             # He may move on.
             end = np.clip(q + rng.uniform(-0.3, 0.3, arm.dof), *arm.bounds)
         motion = parameterize(Path(np.array([q, end])), (), self._separation.limits)
-        begin = world.timeline.now + ahead(world.rules.controller_delay)
+        begin = world.timeline.now + ahead(world.rules.execution.controller_delay)
         self._begin(motion, begin, math.inf, None)
 
     def _begin(
@@ -283,7 +283,7 @@ class Episode:
         before, end = self.found.n_begun, np.clip(q + 0.05, *the_arm().bounds)
         motion = parameterize(Path(np.array([q, end])), (), self._separation.limits)
         for _ in range(40):
-            begin = world.timeline.now + ahead(world.rules.controller_delay)
+            begin = world.timeline.now + ahead(world.rules.execution.controller_delay)
             if self._begin(motion, begin, math.inf, None):
                 break
             world.timeline.run(world.timeline.now + 0.1)

@@ -49,7 +49,7 @@ def _stop_from_reading() -> Patches:
             return former(watch, at, running, phase)
         rules = watch.rules
         return command.stop_along(
-            running, measured, at.now, rules.stop_limits, rules.controller_delay
+            running, measured, at.now, rules.stop_limits, rules.execution.controller_delay
         )
 
     return [(stops, 'stop_of', stop_of), (deciding, 'stop_of', stop_of)]

@@ -251,7 +251,7 @@ class Judge:
         lag = self._world.arm.lag_time
         # The arm does later what is due by then.
         rows = np.array([person.rows_at(time + lag) for time in times])
-        rules = self._world.rules.separation
+        rules = self._world.rules.execution.separation
         assert rules is not None
         speed = rules.rules.contact_speed
         near = distances_to(the_arm(), q, v, person.names, rows, speed, 0.01)

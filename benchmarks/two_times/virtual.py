@@ -76,7 +76,7 @@ def again(
     seed: of all plans; -1: each has a new one.
     """
     rules, recorded = course.rules, course.events
-    delay = rules.controller_delay
+    delay = rules.execution.controller_delay
     settings = load_settings(rules.arm.dof, seed=seed)
     parameters = RehearsedParameters(
         **{field.name: getattr(settings, field.name) for field in fields(settings)},

@@ -239,7 +239,7 @@ def _beside_a_person(client: DemoClient, frame: str) -> tuple[Separation, float]
 
     Return what the planner assumes, and by how much the ray misses the targets at most [m].
     """
-    separation = parameters_of_planner(client).separation
+    separation = parameters_of_planner(client).execution.separation
     if separation is None:
         raise DemoError('separation: false, expected a planner with separation')
     client.see_separation()

@@ -136,7 +136,7 @@ def _move(
     arm, frames = parameters.arm, Frames(client, parameters.base_frame)
     if body is not None:
         # With separation an old body is none.
-        (client.publish if parameters.separation is None else client.stand)(body)
+        (client.publish if parameters.execution.separation is None else client.stand)(body)
     client.publish(target)
     answer = client.ask(PATIENCE)
     report.take(answer)

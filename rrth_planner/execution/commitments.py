@@ -74,8 +74,6 @@ class ExecutionRules:
         From the wearer; None: the controller is given all of the motion at once.
     controller_delay : float
         The greatest of the controller [s].
-    rest_speed : float
-        The arm rests where no joint is faster [rad/s].
     is_manual : bool
         Whether a motion that came to rest on its way goes on after a reset only.
 
@@ -83,7 +81,6 @@ class ExecutionRules:
 
     separation: Separation | None
     controller_delay: float
-    rest_speed: float
     is_manual: bool
 
 
@@ -350,7 +347,7 @@ def note_rest(
     """Take note of where the arm is; return also whether it rests while it is to move on."""
     if reading is None:
         return known, False
-    if reading.is_moving(reading.taken, rules.rest_speed):
+    if reading.is_moving(reading.taken):
         return known if known.rest is None else changed(known, rest=None), False
     if known.is_active:
         place, after = _commanded(known, reading.taken), IGNORED_AFTER
@@ -370,13 +367,12 @@ def has_moved(
     known: Commitments,
     reading: JointReading | None,
     running: ExecutingMotion,
-    rest_speed: float,
     least: float = MOVED,
 ) -> bool:
     """Return whether the arm is further than that [rad] from where its motion begins."""
     if reading is None:
         return False
-    way = reading.mean_positions(rest_speed)
+    way = reading.mean_positions()
     way = way - (known.planned or running).trajectory.positions[0]
     return float(np.abs(way).max()) > least
 
@@ -532,12 +528,10 @@ def _find_present(known: Commitments, reading: JointReading | None) -> Commitmen
     begun = [s for s in known.recent if s.commitment.start_time <= reading.taken]
     if len(begun) < 2:
         return known
-    rest_speed = known.rules.rest_speed
-    is_at_rest = begun[-1].commitment.end_time < reading.taken and not reading.is_moving(
-        reading.taken, rest_speed
-    )
+    end = begun[-1].commitment.end_time
+    is_at_rest = end < reading.taken and not reading.is_moving(reading.taken)
     if is_at_rest:
-        reading = changed(reading, positions=reading.mean_positions(rest_speed))
+        reading = changed(reading, positions=reading.mean_positions())
     aside, nearer = (ASIDE_AT_REST, NEARER_AT_REST) if is_at_rest else (ASIDE, NEARER)
     gap = np.inf
     # What was commanded until then, by all of them in turn.

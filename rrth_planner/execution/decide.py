@@ -167,12 +167,12 @@ def _begun(watch: Watch, event: events.Begin) -> Decision:
         )
     lead = _lead_in(watch, event)
     watch, commanded = _first_commanded(watch, event, lead)
-    delay, rest_speed = rules.controller_delay, rules.rest_speed
+    delay = rules.execution.controller_delay
     watch = changed(
         watch,
         rules=rules,
         goal=event.goal,
-        tracked=track(watch.tracked, commanded, at.reading, at.now, delay, rest_speed),
+        tracked=track(watch.tracked, commanded, at.reading, at.now, delay),
         in_the_way_since=None,
         withheld=None,
         waiting=None,
@@ -189,7 +189,7 @@ def _begun(watch: Watch, event: events.Begin) -> Decision:
 def _lead_in(watch: Watch, event: events.Begin) -> Trajectory:
     """Return what is commanded from a little before now until a motion begins."""
     planned, joins, command = event.planned, event.joins, watch.tracked.command
-    left = planned.start_time - begin_of(event.at.now, event.rules.controller_delay)
+    left = planned.start_time - begin_of(event.at.now, event.rules.execution.controller_delay)
     if joins is None or planned.start_time <= event.at.now:
         return rest_at(planned.trajectory, 0.0)
     if command is None and math.isinf(joins):
@@ -217,7 +217,7 @@ def _first_commanded(
     lead: what is commanded before that.
     """
     known = watch.commitments
-    if event.rules.separation is None:
+    if event.rules.execution.separation is None:
         return changed(watch, commitments=given.end(known)), led(lead, event.planned)
     if known.fault:
         raise RequestError(
@@ -242,7 +242,7 @@ def _first_commanded(
 
 
 def _body_came(watch: Watch, event: events.BodyCame) -> Decision:
-    at, separation = event.at, event.at.rules.separation
+    at, separation = event.at, event.at.rules.execution.separation
     known = watch.commitments
     if separation is None and known.body is not None:
         known = changed(known, body=None)
@@ -484,12 +484,12 @@ def _checked_ignored(watch: Watch, at: Moment) -> Decision:
     reading, running = at.reading, watch.running
     if not watch.is_monitoring or running is None:
         return Decision(watch=watch)
-    rules = watch.rules
-    known, is_ignored = given.note_rest(watch.commitments, reading, running, rules.execution)
+    rules = watch.rules.execution
+    known, is_ignored = given.note_rest(watch.commitments, reading, running, rules)
     watch = with_commitments(watch, known)
     if not is_ignored:
         return Decision(watch=_followed(watch, at))
-    has_moved = given.has_moved(known, reading, running, rules.rest_speed)
+    has_moved = given.has_moved(known, reading, running)
     if not known.is_active:
         # It was given all of it, and may be late: it is monitored as long as that takes.
         return Decision(
@@ -517,9 +517,7 @@ def _followed(watch: Watch, at: Moment) -> Watch:
         not watch.is_doubted
         or running is None
         or is_other
-        or not given.has_moved(
-            watch.commitments, at.reading, running, watch.rules.rest_speed, FOLLOWED
-        )
+        or not given.has_moved(watch.commitments, at.reading, running, FOLLOWED)
         or tracked_phase(watch.tracked, at.reading, at.now) is None
     ):
         return watch
@@ -545,7 +543,7 @@ def _phase(watch: Watch, at: Moment) -> tuple[Decision, float | None]:
     """Return the time within the running motion; None where it is over or unknown [s]."""
     known, is_monitoring = watch.commitments, watch.is_monitoring
     is_waiting = is_monitoring and given.waits_for_reset(known, at.now)
-    if is_over(watch.tracked, at.reading, at.now, watch.rules.rest_speed) and not is_waiting:
+    if is_over(watch.tracked, at.reading, at.now) and not is_waiting:
         found = Decision(watch=watch)
         if is_monitoring and not given.is_arrived(known, at.now):
             found = _given_up(watch, at, TOO_NEAR)

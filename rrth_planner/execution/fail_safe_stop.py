@@ -49,7 +49,7 @@ def stop_of(watch: Watch, at: Moment, running: ExecutingMotion, phase: float) ->
     if watch.commitments.is_active or commands(watch.tracked, running, at.reading):
         phase = at.now - running.start_time
     rules = watch.rules
-    delay, is_on_reception = rules.controller_delay, watch.is_unstamped
+    delay, is_on_reception = rules.execution.controller_delay, watch.is_unstamped
     return stop_along(running, phase, at.now, rules.stop_limits, delay, is_on_reception)
 
 

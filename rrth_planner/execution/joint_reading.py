@@ -31,6 +31,8 @@ class JointReading:
         (n, dof) [rad]; None: nothing is known of others.
     wound : ndarray, shape (dof,), or None
         What is added to the positions of the message: whole turns [rad]; None: nothing.
+    rest_speed : float
+        The arm rests where no joint is faster [rad/s, of a joint that slides m/s].
 
     """
 
@@ -41,25 +43,36 @@ class JointReading:
     velocities_expire: float
     recent: tuple[Array, Array] | None = None
     wound: Array | None = None
+    rest_speed: float = REST_SPEED
 
-    def is_moving(self, now: float, rest_speed: float = REST_SPEED) -> bool:
-        """Return whether the arm moves at a time [s], faster than a speed [rad/s]."""
-        is_slow = (np.abs(self.mean_velocities(rest_speed)) <= rest_speed).all()
+    def is_moving(self, now: float, speed: float | None = None) -> bool:
+        """
+        Return whether the arm moves at a time [s]; where it does not it rests.
+
+        speed: in place of `rest_speed`, for the mean over the same time. An arm whose velocities
+        have expired by then rests.
+        """
+        greatest = self.rest_speed if speed is None else speed
+        is_slow = (np.abs(self.mean_velocities()) <= greatest).all()
         return now <= self.velocities_expire and not bool(is_slow)
 
-    def mean_velocities(self, rest_speed: float = REST_SPEED) -> Array:
+    def rests_after(self, time: float) -> bool:
+        """Return whether the arm rested at this reading, which came after a time [s]."""
+        return self.received >= time and not self.is_moving(self.taken)
+
+    def mean_velocities(self) -> Array:
         """
-        Return how fast the arm has moved lately, (dof,) [rad/s], to compare with a speed.
+        Return how fast the arm has moved lately, (dof,) [rad/s], to compare with `rest_speed`.
 
         By the positions, since drivers differentiate noisy ones; where these have not changed, or
         there are no others, as it was given.
         """
-        motion = _mean_motion(self, rest_speed)
+        motion = _mean_motion(self)
         return self.velocities if motion is None else motion[1]
 
-    def mean_positions(self, rest_speed: float = REST_SPEED) -> Array:
+    def mean_positions(self) -> Array:
         """Return where the arm is, (dof,) [rad], if it rests: the mean over the same time."""
-        motion = _mean_motion(self, rest_speed)
+        motion = _mean_motion(self)
         return self.positions if motion is None else motion[0]
 
     def shifted(self, step: float) -> 'JointReading':
@@ -75,12 +88,12 @@ class JointReading:
 
 
 @functools.lru_cache(maxsize=8)
-def _mean_motion(reading: JointReading, rest_speed: float) -> tuple[Array, Array] | None:
+def _mean_motion(reading: JointReading) -> tuple[Array, Array] | None:
     """Return mean positions and velocities; None where only the reading itself counts."""
     if reading.recent is None or not (reading.recent[1] != reading.positions).any():
         return None
     with np.errstate(over='ignore', invalid='ignore'):
-        return mean_motion(*reading.recent, rest_speed)
+        return mean_motion(*reading.recent, reading.rest_speed)
 
 
 def with_earlier(q: Array, taken: float, before: JointReading | None) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ import numpy as np
 from rrth_planner.execution.executing_motion import ExecutingMotion, LONGEST_LAG, phase_of
 from rrth_planner.execution.joint_reading import JointReading
 from rrth_planner.model.frozen import changed
-from rrth_planner.model.trajectory import REST_SPEED, sample, Trajectory
+from rrth_planner.model.trajectory import sample, Trajectory
 
 # An arm at rest so long after the end of its motion has arrived; one that is off its motion for so
 # long is lost [s].
@@ -78,8 +78,8 @@ class TrackedMotion:
         When the arm was last found on its motion [s].
     off_since : float or None
         Since when the arm rests off what it is commanded, by a clock that is never set [s].
-    delay, rest_speed : float
-        How late the controller may be [s]; the arm rests where no joint is faster [rad/s].
+    delay : float
+        How late the controller may be [s].
 
     """
 
@@ -91,7 +91,6 @@ class TrackedMotion:
     found: float = 0.0
     off_since: float | None = None
     delay: float = 0.0
-    rest_speed: float = REST_SPEED
 
 
 def track(
@@ -100,18 +99,11 @@ def track(
     reading: JointReading | None,
     now: float,
     delay: float = 0.0,
-    rest_speed: float = REST_SPEED,
 ) -> TrackedMotion:
-    """
-    Track a motion of a controller that is at most `delay` late, from its beginning [s].
-
-    An arm rests where no joint is faster than a speed [rad/s].
-    """
-    is_left = is_over(tracked, reading, now, rest_speed)
+    """Track a motion of a controller that is at most `delay` late, from its beginning [s]."""
+    is_left = is_over(tracked, reading, now)
     before = None if is_left or tracked_phase(tracked, reading, now) is None else tracked.motion
-    return TrackedMotion(
-        motion, motion, previous=before, found=now, delay=delay, rest_speed=rest_speed
-    )
+    return TrackedMotion(motion, motion, previous=before, found=now, delay=delay)
 
 
 def track_next(tracked: TrackedMotion, motion: ExecutingMotion) -> TrackedMotion:
@@ -153,7 +145,7 @@ def check_command(
     # Joint states that do not come any more are those of an arm that stays.
     taken = max(reading.taken, now - lag)
     is_off = tracked.command.deviation(reading.positions, taken, lag) > OFF_COMMAND
-    if not is_off or reading.is_moving(now, tracked.rest_speed):
+    if not is_off or reading.is_moving(now):
         return tracked if tracked.off_since is None else changed(tracked, off_since=None)
     if tracked.off_since is None:
         return changed(tracked, off_since=steady)
@@ -187,22 +179,13 @@ def shifted(tracked: TrackedMotion, step: float) -> TrackedMotion:
     )
 
 
-def is_over(
-    tracked: TrackedMotion,
-    reading: JointReading | None,
-    now: float,
-    rest_speed: float = REST_SPEED,
-) -> bool:
-    """
-    Return whether the motion, if there is one, has ended and the arm is at rest.
-
-    There no joint is faster than a speed [rad/s].
-    """
+def is_over(tracked: TrackedMotion, reading: JointReading | None, now: float) -> bool:
+    """Return whether the motion, if there is one, has ended and the arm is at rest."""
     motion = tracked.motion
     if motion is None or reading is None:
         return False
     since = now - motion.start_time - motion.trajectory.duration
-    return since > GRACE + tracked.delay and not reading.is_moving(now, rest_speed)
+    return since > GRACE + tracked.delay and not reading.is_moving(now)
 
 
 def tracked_phase(

@@ -15,7 +15,6 @@ from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.frozen import changed
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
-from rrth_planner.model.separation import Separation
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
 
 # Stops that were not taken yet: so many of the last ones are kept.
@@ -61,18 +60,6 @@ class MonitorRules(Protocol):
         """Of fail-safe stops."""
 
     @property
-    def controller_delay(self) -> float:
-        """The greatest one [s]."""
-
-    @property
-    def rest_speed(self) -> float:
-        """The arm rests where no joint is faster [rad/s]."""
-
-    @property
-    def separation(self) -> Separation | None:
-        """What commitments are proven with; None: motions are published as they are planned."""
-
-    @property
     def execution(self) -> ExecutionRules:
         """How a motion is executed."""
 
@@ -96,21 +83,6 @@ class PlainRules:
     execution: ExecutionRules
     stands_still: bool = False
     replan: bool = True
-
-    @property
-    def controller_delay(self) -> float:
-        """The greatest one [s]."""
-        return self.execution.controller_delay
-
-    @property
-    def rest_speed(self) -> float:
-        """The arm rests where no joint is faster [rad/s]."""
-        return self.execution.rest_speed
-
-    @property
-    def separation(self) -> Separation | None:
-        """What commitments are proven with."""
-        return self.execution.separation
 
 
 def plain(rules: MonitorRules) -> PlainRules:

@@ -8,7 +8,6 @@ from pathlib import Path
 from rrth_planner.execution.commitments import ExecutionRules
 from rrth_planner.io.settings import PlanSettings
 from rrth_planner.model.arm import ArmModel
-from rrth_planner.model.separation import Separation
 from rrth_planner.model.trajectory import MotionLimits
 
 
@@ -42,21 +41,6 @@ class RehearsedParameters(PlanSettings):
     replan: bool = True
     required_boxes: tuple[str, ...] = ()
     separates: str = 'true'
-
-    @property
-    def controller_delay(self) -> float:
-        """The greatest one [s]."""
-        return self.execution.controller_delay
-
-    @property
-    def rest_speed(self) -> float:
-        """The arm rests where no joint is faster [rad/s]."""
-        return self.execution.rest_speed
-
-    @property
-    def separation(self) -> Separation | None:
-        """What commitments are proven with."""
-        return self.execution.separation
 
     @property
     def incident_path(self) -> Path:

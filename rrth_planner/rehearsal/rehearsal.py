@@ -41,7 +41,6 @@ from rrth_planner.simulation.trajectory_controller import ControllerRules, Contr
 
 # Where the arm begins [rad].
 FOLDED = (0.0, -0.35, 0.5 * np.pi, 0.5 * np.pi)
-REST_SPEED = 0.01
 # As the planner node has them by default [rad], [s].
 START_TOLERANCE, BODY_TIMEOUT, JOINT_TIMEOUT, PATIENCE = 0.002, 0.2, 0.2, 5.0
 
@@ -116,7 +115,7 @@ def rehearsed(
         **{field.name: getattr(settings, field.name) for field in fields(settings)},
         arm=arm,
         stop_limits=stop_limits,
-        execution=ExecutionRules(separation, execution.delay, REST_SPEED, False),
+        execution=ExecutionRules(separation, execution.delay, False),
         body_timeout=BODY_TIMEOUT,
         joint_timeout=JOINT_TIMEOUT,
         keep_lost=tracker.keep_lost,

@@ -38,7 +38,7 @@ class VirtualInputs:
         joints = self.joints_at(now, parameters.joint_timeout)
         if goal is None:
             raise RequestError(ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA, 'no target')
-        return InputSnapshot(scene, goal, joints, parameters.rest_speed)
+        return InputSnapshot(scene, goal, joints)
 
     def scene_at(self, now: float, parameters: RequestParameters) -> Scene:
         """Return the present wearer [s], or raise RequestError."""

@@ -106,7 +106,7 @@ class Witness:
         """Begin with nothing seen."""
         self.testimony = Testimony()
         self._world, self._truth, self._is_drawn = world, truth, is_drawn
-        separation = world.rules.separation
+        separation = world.rules.execution.separation
         self._contact_speed = 0.1 if separation is None else separation.rules.contact_speed
         self._rules = None if separation is None else separation.rules
         self._sights: dict[int, tuple[Command, _Sight]] = {}

@@ -19,7 +19,7 @@ from rrth_planner.model.errors import RequestError, RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.status import ErrorCode
-from rrth_planner.model.trajectory import REST_SPEED, StartState
+from rrth_planner.model.trajectory import StartState
 from rrth_planner.requests.parameters import RequestParameters
 
 
@@ -34,23 +34,18 @@ class InputSnapshot:
     scene: Scene
     goal: PointingGoal
     joints: JointReading
-    rest_speed: float = REST_SPEED
 
     @property
     def q_start(self) -> Array:
         """Where the arm rests, shape (dof,) [rad]."""
-        return self.joints.mean_positions(self.rest_speed)
-
-    def is_moving(self, now: float) -> bool:
-        """Return whether the arm moves at a time [s]."""
-        return self.joints.is_moving(now, self.rest_speed)
+        return self.joints.mean_positions()
 
     def require_rest(self, now: float, arm: ArmModel) -> None:
         """Raise ArmHasMoved where the arm moves at a time [s]."""
-        if self.is_moving(now):
-            expected = f'an arm at rest (at most {self.rest_speed:g} rad/s, rest_speed)'
-            velocities = self.joints.mean_velocities(self.rest_speed)
-            raise _rejection(arm, velocities, expected, ArmHasMoved)
+        joints = self.joints
+        if joints.is_moving(now):
+            expected = f'an arm at rest (at most {joints.rest_speed:g} {{unit}}, rest_speed)'
+            raise _rejection(arm, joints.mean_velocities(), expected, ArmHasMoved)
 
     def is_commanded(self, running: ExecutingMotion | None, delay: float) -> bool:
         """Return whether the arm executes a motion, at most so much later than stated [s]."""
@@ -63,7 +58,7 @@ class InputSnapshot:
         self, running: ExecutingMotion | None, now: float, span: float, delay: float = 0.0
     ) -> bool:
         """Return whether the arm rests within its motion, and moves on in less than a span [s]."""
-        if running is None or self.is_moving(now):
+        if running is None or self.joints.is_moving(now):
             return False
         if self.is_commanded(running, delay):
             return running.will_move(now, span)
@@ -93,7 +88,7 @@ class InputSnapshot:
         ):
             # The arm may lag, or was not on it yet: a stop, say, may just have been published.
             known = joints.taken - running.start_time, 1.0
-        elif running is not None and not self.is_moving(joints.taken):
+        elif running is not None and not joints.is_moving(joints.taken):
             known = self._localize(running)
         try:
             # Velocities that overflow match no motion.
@@ -166,6 +161,7 @@ def _rejection(
 ) -> RequestError:
     speeds = np.abs(velocities)
     k = int(np.argmax(np.where(np.isnan(speeds), np.inf, speeds)))
-    speed = f'{speeds[k]:.3f} {"m/s" if arm.is_prismatic[k] else "rad/s"}'
-    sentence = f'{arm.joint_names[k]} moves at {speed}, expected {expected}'
+    unit = 'm/s' if arm.is_prismatic[k] else 'rad/s'
+    expected = expected.format(unit=unit)
+    sentence = f'{arm.joint_names[k]} moves at {speeds[k]:.3f} {unit}, expected {expected}'
     return kind(ErrorCode.START_STATE_INVALID, sentence)

@@ -78,7 +78,7 @@ async def plan_request(
     question: PlanQuestion | None = None
     plan: MotionPlan | None = None
     try:
-        delay = parameters.controller_delay
+        delay = parameters.execution.controller_delay
         for lead in LEADS:
             question = plan = None
             require_not_cancelled(should_stop, 'the request was cancelled before its turn')
@@ -87,7 +87,7 @@ async def plan_request(
             running = hold(then + LATE)
             snapshot = inputs.at(now, parameters, goal)
             handover, q_start = None, snapshot.q_start
-            if snapshot.is_moving(now) or snapshot.is_about_to_move(
+            if snapshot.joints.is_moving(now) or snapshot.is_about_to_move(
                 running, now, then - now, delay
             ):
                 handover = _handover(snapshot, running, then, lead, parameters)
@@ -183,7 +183,7 @@ def _handover(
     parameters: RequestParameters,
 ) -> Handover:
     """Return the handover from a moving arm at about a time [s]."""
-    delay = parameters.controller_delay
+    delay = parameters.execution.controller_delay
     start = snapshot.start_state_at(running, time, parameters.arm, delay)
     is_commanded = snapshot.is_commanded(running, delay) and start.running is not None
     if is_commanded and running is not None and start.time < running.trajectory.duration:
@@ -204,7 +204,7 @@ def _question(
     body_age: float,
     seed: int,
 ) -> PlanQuestion:
-    separation = parameters.separation
+    separation = parameters.execution.separation
     return PlanQuestion(
         arm=parameters.arm,
         scene=snapshot.scene,

@@ -88,20 +88,15 @@ class _Resumption:
     is_during_stop: bool
     is_first: bool = True
 
-    def is_due(self, joints: JointReading | None, rest_speed: float, present: float) -> bool:
+    def is_due(self, joints: JointReading | None, present: float) -> bool:
         """
         Return whether to try now: during the stop, or once a reading after it has the arm at rest.
 
-        At rest it is no faster than a speed [rad/s]. Also once the time to wait for that is up, by
-        a time that never steps [s].
+        Also once the time to wait for that is up, by a time that never steps [s].
         """
         if self.is_during_stop or present >= self.latest:
             return True
-        return (
-            joints is not None
-            and joints.received >= self.stopped
-            and not joints.is_moving(joints.taken, rest_speed)
-        )
+        return joints is not None and joints.rests_after(self.stopped)
 
 
 class PlanQueue:
@@ -364,9 +359,9 @@ class PlanQueue:
             scene = self._inputs.scene_at(now, parameters)
         except RequestError:
             return False
-        if joints.is_moving(now, parameters.rest_speed):
+        if joints.is_moving(now):
             return False
-        q = joints.mean_positions(parameters.rest_speed)
+        q = joints.mean_positions()
         margin, length = parameters.margin, parameters.ray_guard_length
         is_free = is_place_free(q, arm, scene, margin, length)
         return not is_free and is_place_free(q, arm, scene, margin, 0.0)
@@ -395,7 +390,7 @@ class PlanQueue:
         assert trajectory is not None and plan is not None and snapshot is not None
         now = self._host.now()
         self._report.body_used(self._inputs.body_age(now))
-        handover, start = outcome.handover, now + ahead(parameters.controller_delay)
+        handover, start = outcome.handover, now + ahead(parameters.execution.controller_delay)
         planned = ExecutingMotion(
             trajectory=trajectory,
             start_time=start if handover is None else handover.time,
@@ -416,7 +411,7 @@ class PlanQueue:
         self._pursued, self._given_up = ticket.request, (None, *CANCELLED)
         self._report.pursued(ticket.request)
         # As a whole it is published with what leads to it.
-        whole = monitor.watch.running if parameters.separation is None else None
+        whole = monitor.watch.running if parameters.execution.separation is None else None
         published = planned if whole is None else whole
         return replace(outcome, stamp=stamp_of(published.start_time))
 
@@ -426,7 +421,7 @@ class PlanQueue:
         self._show_newest()
         self._save_if_failed()
         watch = self._monitor.watch
-        if watch.running is None or watch.rules.separation is not None:
+        if watch.running is None or watch.rules.execution.separation is not None:
             self._publishers.withdraw_whole()
         now, present = self._host.now(), self._host.steady()
         for stop in self._monitor.take_stops():
@@ -452,9 +447,7 @@ class PlanQueue:
         if resumption is not None and self._is_overtaken(resumption):
             self._give_up(resumption, *OVERTAKEN)
             self._discard_resumption()
-        elif resumption is not None and resumption.is_due(
-            self._inputs.reading, self._report.parameters.rest_speed, present
-        ):
+        elif resumption is not None and resumption.is_due(self._inputs.reading, present):
             self._resumption = None
             self._host.begin(self._resume(resumption))
         self._note_end()

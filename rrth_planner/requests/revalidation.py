@@ -106,7 +106,8 @@ class Revalidation:
     def _require_arm(self, present: InputSnapshot, now: float) -> None:
         """Raise ArmHasMoved where the arm is not at the start of the motion."""
         snapshot, handover, arm = self.snapshot, self.handover, self.parameters.arm
-        delay, expected, what = self.parameters.controller_delay, snapshot.q_start, 'moved by'
+        delay = self.parameters.execution.controller_delay
+        expected, what = snapshot.q_start, 'moved by'
         place, tolerance = present.q_start, self.parameters.start_tolerance
         if handover is None:
             present.require_rest(now, arm)

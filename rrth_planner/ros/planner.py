@@ -88,7 +88,7 @@ class PlannerNode(Node):
                 parameters.stop_limits,
                 parameters.margin,
                 parameters.ray_guard_length,
-                parameters.separation,
+                parameters.execution.separation,
             )
             self._planner.warm_up(parameters.arm, parameters.options, parameters.second_checker)
         except BaseException:
@@ -133,6 +133,7 @@ class PlannerNode(Node):
             self.fail,
             self._keep_removed,
             self._monitor.check_clock,
+            lambda: self._reporter.parameters.rest_speed,
         )
         self.host = NodeHost(self, self._planner, self.fail)
         self._queue = PlanQueue(self.host, inputs, self._reporter, publishers, self._monitor)
@@ -176,7 +177,8 @@ class PlannerNode(Node):
 
     def _on_change(self) -> None:
         """Take note of what comes in for the first time, or otherwise than before."""
-        if self._inputs.source.is_stream and self._reporter.parameters.separation is not None:
+        separation = self._reporter.parameters.execution.separation
+        if self._inputs.source.is_stream and separation is not None:
             self._motions.separate()
         self._reporter.publish()
 

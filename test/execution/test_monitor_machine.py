@@ -7,6 +7,7 @@ from hypothesis import settings, strategies as st
 from hypothesis.stateful import initialize, invariant, rule, RuleBasedStateMachine
 import numpy as np
 from rrth_planner.execution import event as events
+from rrth_planner.execution.commitments import ExecutionRules
 from rrth_planner.execution.event import Look, Moment, Sight
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.fail_safe_stop import pending
@@ -28,9 +29,9 @@ SEPARATION = Separation(
     stop_limits=worlds.limits(),
 )
 RULES = [
-    Rules(controller_delay=DELAY),
-    Rules(controller_delay=DELAY, separation=SEPARATION),
-    Rules(controller_delay=DELAY, separation=SEPARATION, is_manual=True),
+    Rules(execution=ExecutionRules(None, DELAY, False)),
+    Rules(execution=ExecutionRules(SEPARATION, DELAY, False)),
+    Rules(execution=ExecutionRules(SEPARATION, DELAY, True)),
 ]
 MOTION = turn()
 STALE = 'the body is 1.000 s old'
@@ -229,7 +230,7 @@ class Monitor(RuleBasedStateMachine):
             assert watch.running is None
         if watch.commitments.is_active:
             assert watch.running is not None
-            assert watch.rules.separation is not None
+            assert watch.rules.execution.separation is not None
         if watch.pending is not None:
             assert watch.is_monitoring
 

@@ -160,7 +160,7 @@ def test_the_witness_sees_contacts_that_nobody_else_sees():
         margin=0.02,
         ray_guard_length=1.0,
         stop_limits=limits,
-        execution=ExecutionRules(separation, 0.01, 0.01, False),
+        execution=ExecutionRules(separation, 0.01, False),
     )
     world = World(rules, OnTheWay(), np.zeros(arm.dof), 0, Wire())
     witness = Witness(world, OnTheWay())

@@ -31,7 +31,8 @@ FAR = Box('far', [3.0, 3.0, 3.0], [0.1, 0.1, 0.1], np.eye(3))
 def without_separation(node):
     """Return the parameters of a node whose motions are monitored as a whole."""
     separated = declare_parameters(node)
-    return replace(separated, separation=None, body_timeout=0.0, joint_timeout=0.0)
+    execution = replace(separated.execution, separation=None)
+    return replace(separated, execution=execution, body_timeout=0.0, joint_timeout=0.0)
 
 
 def know(monitor, **known):

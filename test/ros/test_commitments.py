@@ -201,7 +201,7 @@ def test_beside_a_wearer_each_commitment_continues_the_last_one_and_is_separate(
                 strict=True,
             ):
                 assert np.abs(now - then).max() <= same
-            settings = arm.reporter.parameters.separation
+            settings = arm.reporter.parameters.execution.separation
             body = body_at(arm.monitor.watch.commitments.body, begin, settings.rules)
             found = separation_violations(
                 ARM, body, trajectory, settings.rules, settings.margin, period=5e-3

@@ -3,6 +3,7 @@
 """How much of everything is taken: more is rejected in one sentence, at once and whole."""
 
 import bisect
+from dataclasses import replace
 from pathlib import Path
 import time
 
@@ -286,3 +287,15 @@ def test_an_arm_that_is_nowhere_soon_is_rejected():
     assert np.isfinite(inputs.start_state_at(None, 1.0, load_arm()).state.positions).all()
     with pytest.raises(RequestError, match=r'joint_2 moves at .*a finite position 2\.000 s later'):
         inputs.start_state_at(None, 2.0, load_arm())
+
+
+def test_an_arm_that_moves_is_told_in_the_unit_of_the_joint():
+    slides = replace(load_arm(), is_prismatic=(False, False, True, False))
+    reading = joint_reading(joints(velocity=[0.0, 0.0, 0.5, 0.0]), JOINTS, 0.0, None)
+    inputs = InputSnapshot(Scene(()), PointingGoal([1.0, 0.0, 0.0]), reading)
+    for arm, unit in ((load_arm(), 'rad/s'), (slides, 'm/s')):
+        told = rf'joint_3 moves at 0\.500 {unit}, .* \(at most 0\.01 {unit}, rest_speed\)'
+        with pytest.raises(RequestError, match=told):
+            inputs.require_rest(0.0, arm)
+    inputs = replace(inputs, joints=replace(reading, rest_speed=0.5))
+    inputs.require_rest(0.0, arm)

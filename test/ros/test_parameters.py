@@ -202,7 +202,7 @@ def test_every_option_of_the_core_is_a_parameter():
 def test_separation_is_a_word_or_a_truth_value(started, value, chosen):
     _, parameters = started(separation=value)
     assert parameters.separates == chosen
-    assert (parameters.separation is None) == (chosen == 'false')
+    assert (parameters.execution.separation is None) == (chosen == 'false')
     assert parameters.body_timeout == (0.0 if chosen == 'false' else 0.2)
 
 

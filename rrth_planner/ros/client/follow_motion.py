@@ -17,8 +17,6 @@ from tqdm import tqdm  # type: ignore[import-untyped]
 OTHER_TARGET = 1e-3
 # An arm that has arrived stays there for so long [s].
 SETTLED = 0.1
-# And moves no faster [rad/s].
-REST_SPEED = 0.01
 SPACING = 0.01
 
 
@@ -61,7 +59,7 @@ def follow(
                 bar.reset(total=round(motion.duration, 2))
             bar.n = max(bar.n, _time_along(motion, client.positions()))
             bar.refresh()
-            is_there = client.is_still_at(motion.positions[-1], tolerance, REST_SPEED)
+            is_there = client.is_still_at(motion.positions[-1], tolerance)
             if not is_there or present - begin < motion.duration:
                 arrived_at = None
                 client.require_pursued(answer)

@@ -12,7 +12,6 @@ import warnings
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PointStamped
-import numpy as np
 from rclpy.duration import Duration
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import SingleThreadedExecutor
@@ -29,7 +28,7 @@ from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import MessageError, one_line, RrthError
 from rrth_planner.model.status import ErrorCode
-from rrth_planner.model.trajectory import Trajectory
+from rrth_planner.model.trajectory import REST_SPEED, Trajectory
 from rrth_planner.requests.answer import Answer
 from rrth_planner.ros.interface.parameters import (
     declared,
@@ -329,12 +328,12 @@ class PlannerClient(Node):
             raise NotInTimeError('joint_states: none yet')
         return configuration_from_msg(self.state, self.joint_names)
 
-    def is_still_at(self, q: Array, tolerance: float, speed: float) -> bool:
+    def is_still_at(self, q: Array, tolerance: float, speed: float = REST_SPEED) -> bool:
         """Return whether the arm is so close to q [rad], and no faster than a speed [rad/s]."""
         reading = self._reading
         if reading is None or gaps_between(reading.mean_positions(), q).max() > tolerance:
             return False
-        return bool((np.abs(reading.mean_velocities()) <= speed).all())
+        return not reading.is_moving(reading.taken, speed)
 
     def ask(self, patience: float) -> Answer:
         """Return the planner's answer; ask again while it lacks a recent input, for a time [s]."""

@@ -146,7 +146,7 @@ class Inputs:
         scene = self.scene_at(now, parameters)
         goal = self._goal() if goal is None else goal
         joints = self.joints_at(now, parameters.joint_timeout)
-        return InputSnapshot(scene, goal, joints, parameters.rest_speed)
+        return InputSnapshot(scene, goal, joints)
 
     def scene_at(self, now: float, parameters: RequestParameters) -> Scene:
         """Return the present wearer [s], or raise RequestError where he is not known."""

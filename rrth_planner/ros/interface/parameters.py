@@ -150,12 +150,8 @@ class PlannerParameters(PlanSettings):
         Of fail-safe stops.
     separates : str
         `ALWAYS`, `NEVER` or `AUTO`, as the node was started.
-    separation : Separation or None
-        What commitments are proven with; None: motions are published as they are planned.
-    controller_delay : float
-        The arm executes a motion at most so late [s].
-    resume : str
-        `AUTO` or `MANUAL`.
+    execution : ExecutionRules
+        How a motion that is planned with these is executed.
     body_timeout, joint_timeout : float
         [s]; 0: never.
     body_latency, keep_lost, patience : float
@@ -175,9 +171,7 @@ class PlannerParameters(PlanSettings):
     base_frame: str
     stop_limits: MotionLimits
     separates: str
-    separation: Separation | None
-    controller_delay: float
-    resume: str
+    execution: ExecutionRules
     body_timeout: float
     joint_timeout: float
     body_latency: float
@@ -192,7 +186,7 @@ class PlannerParameters(PlanSettings):
     @property
     def stands_still(self) -> bool:
         """Whether motions are published as they are planned since the body stands still."""
-        return self.separates == AUTO and self.separation is None
+        return self.separates == AUTO and self.execution.separation is None
 
     @property
     def incident_path(self) -> Path:
@@ -200,13 +194,6 @@ class PlannerParameters(PlanSettings):
         if self.incident_folder:
             return Path(self.incident_folder).expanduser()
         return Path(get_logging_directory()) / 'rrth_planner'
-
-    @property
-    def execution(self) -> ExecutionRules:
-        """How a motion that is planned with these is executed."""
-        return ExecutionRules(
-            self.separation, self.controller_delay, self.rest_speed, self.resume == MANUAL
-        )
 
 
 def in_effect(parameters: PlannerParameters, source: BodySource) -> PlannerParameters:
@@ -219,7 +206,8 @@ def in_effect(parameters: PlannerParameters, source: BodySource) -> PlannerParam
 @lru_cache(maxsize=4)
 def _beside_standing(parameters: PlannerParameters) -> PlannerParameters:
     """Return parameters without separation, with which a body gets never too old."""
-    return replace(parameters, separation=None, body_timeout=0.0)
+    execution = replace(parameters.execution, separation=None)
+    return replace(parameters, execution=execution, body_timeout=0.0)
 
 
 def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerParameters:
@@ -238,7 +226,7 @@ def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerP
     require_library(settings.second_checker)
     if not values['base_frame']:
         raise OptionsError('base_frame: empty, expected the name of the frame of the wearer')
-    own = (*('base_frame', 'body_latency', 'keep_lost', 'replan', 'incident_folder', 'resume'),)
+    own = (*('base_frame', 'body_latency', 'keep_lost', 'replan', 'incident_folder'),)
     tolerances = 'rest_speed', 'start_tolerance'
     if values['resume'] not in (AUTO, MANUAL):
         raise OptionsError(f'resume: "{values["resume"]}", expected {AUTO} or {MANUAL}')
@@ -256,20 +244,22 @@ def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerP
     arm = _with_allowed(arm, pairs) if pairs else arm
     stop_limits = _stop_limits(values, settings.limits)
     rules = _separation_rules(values)
+    separation = Separation(
+        arm=arm,
+        rules=rules,
+        margin=settings.margin,
+        limits=settings.limits,
+        stop_limits=stop_limits,
+    )
     return PlannerParameters(
         arm=arm,
         stop_limits=stop_limits,
         separates=separates,
-        separation=Separation(
-            arm=arm,
-            rules=rules,
-            margin=settings.margin,
-            limits=settings.limits,
-            stop_limits=stop_limits,
-        )
-        if separates != NEVER
-        else None,
-        controller_delay=rules.controller_delay,
+        execution=ExecutionRules(
+            None if separates == NEVER else separation,
+            rules.controller_delay,
+            values['resume'] == MANUAL,
+        ),
         **timeouts,
         required_boxes=tuple(name for name in values['required_boxes'] or () if name),
         **{name: values[name] for name in (*own, *tolerances, 'patience')},

@@ -77,7 +77,7 @@ class PlanPublishers:
 
     def _publisher(self, parameters: MonitorRules) -> Publisher:
         """Return the publisher of what the arm executes of a motion with these parameters."""
-        found = self._whole if parameters.separation is None else self._committed
+        found = self._whole if parameters.execution.separation is None else self._committed
         if found is None:
             raise RuntimeError('no publisher of such motions, expected that of their separation')
         return found

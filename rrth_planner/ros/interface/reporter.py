@@ -73,7 +73,7 @@ class Reporter:
         self._body: BodyMotion | None = None
         self._state: Publisher | None = None
         self._published_state, self._published_trouble = self._separation, self._unfollowed
-        if parameters.separation is not None:
+        if parameters.execution.separation is not None:
             self._state = node.create_publisher(DiagnosticStatus, '~/state', LATCHED)
             self._publish_state()
         self._published = -SHORTEST_PERIOD
@@ -261,7 +261,8 @@ class Reporter:
 
     def _separation_values(self, now: float) -> dict[str, object]:
         """Return what is known of separation at a time [s]."""
-        status, body, separation = self._published_state, self._body, self.parameters.separation
+        status, body = self._published_state, self._body
+        separation = self.parameters.execution.separation
         n_seen, n_faster = (0, 0) if body is None else (body.n_seen, body.n_faster)
         return {
             'separation': status.state.name,

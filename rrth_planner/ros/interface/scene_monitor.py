@@ -63,6 +63,8 @@ class SceneMonitor:
         Returns how long a part that is removed now stays where it was [s].
     check_clock : callable, optional
         Called before a message is read: its times are compared with those of others.
+    rest_speed : callable, optional
+        Returns the greatest speed of a joint at rest now [rad/s]; without, that of `parameters`.
 
     """
 
@@ -76,6 +78,7 @@ class SceneMonitor:
         on_error: Callable[[str], None] = lambda what: None,
         keep_removed: Callable[[], float] = lambda: 0.0,
         check_clock: Callable[[], None] = lambda: None,
+        rest_speed: Callable[[], float] | None = None,
     ) -> None:
         """Subscribe."""
         self._node = node
@@ -83,6 +86,7 @@ class SceneMonitor:
         self._base_frame, self._latency = parameters.base_frame, parameters.body_latency
         self._on_change, self._notify_body = on_change, on_body
         self._check_clock = check_clock
+        self._rest_speed = rest_speed or (lambda: parameters.rest_speed)
         self._frames = Frames(node, parameters.base_frame)
         self._warned: dict[tuple[str, str], float] = {}
         self._inputs = inputs
@@ -214,12 +218,11 @@ class SceneMonitor:
         if not has_joint_of(msg, self._joint_names):
             return
         self._check_clock()
-        now, source = self._now(), self._inputs.joints
+        now, source, rest_speed = self._now(), self._inputs.joints, self._rest_speed()
+        names, is_continuous = self._joint_names, self._arm.is_continuous
         self._take(
             source,
-            lambda: joint_reading(
-                msg, self._joint_names, now, source.value, self._arm.is_continuous
-            ),
+            lambda: joint_reading(msg, names, now, source.value, is_continuous, rest_speed),
             stamped_at(msg, now),
         )
         if set(self._joint_names) <= set(msg.name):

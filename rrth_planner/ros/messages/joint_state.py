@@ -9,6 +9,7 @@ import numpy as np
 from rrth_planner.execution.joint_reading import JointReading, with_earlier
 from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.model.errors import MessageError
+from rrth_planner.model.trajectory import REST_SPEED
 from rrth_planner.ros.messages.fields import seconds_of
 from sensor_msgs.msg import JointState
 
@@ -104,13 +105,15 @@ def joint_reading(
     received: float,
     before: JointReading | None,
     is_continuous: Sequence[bool] = (),
+    rest_speed: float = REST_SPEED,
 ) -> JointReading:
     """
     Return the positions and velocities of these joints, by name; others are ignored.
 
     Of a message without velocities, received at a time [s], these are the change since the reading
     before. Positions of continuous joints that a driver reports wrapped, from -pi to pi or from 0
-    to 2 pi, go on from those of that reading.
+    to 2 pi, go on from those of that reading. The arm rests where no joint is faster than
+    `rest_speed` [rad/s, of a joint that slides m/s].
 
     Raises
     ------
@@ -133,12 +136,14 @@ def joint_reading(
                 'one a name [rad/s]'
             )
         v = np.array([msg.velocity[names.index(name)] for name in joint_names], dtype=np.float64)
-        return JointReading(q, v, taken, received, float('inf'), recent, wound)
+        return JointReading(q, v, taken, received, math.inf, recent, wound, rest_speed)
     if before is None or received < before.received:
         # After a step back of the clock the elapsed time is unknown.
-        return JointReading(q, np.zeros_like(q), taken, received, received, recent, wound)
+        v = np.zeros_like(q)
+        return JointReading(q, v, taken, received, received, recent, wound, rest_speed)
     step = max(received - before.received, 1e-9)
     # What overflows is infinite, and never at rest.
     with np.errstate(over='ignore'):
         v = (q - before.positions) / step
-    return JointReading(q, v, taken, received, before.received + DIFFERENCE_AGE, recent, wound)
+    until = before.received + DIFFERENCE_AGE
+    return JointReading(q, v, taken, received, until, recent, wound, rest_speed)

@@ -141,7 +141,7 @@ class ExecutionMonitor:
 
         def came() -> BodyCame:
             at = self._moment()
-            if body is not self._seen and at.rules.separation is not None:
+            if body is not self._seen and at.rules.execution.separation is not None:
                 parts = (*body.parts, *body.lost)
                 measured = np.array([part.measured for _, part in parts for _ in part.boxes])
                 sights.append(Sight(scene_of(body), measured))
@@ -151,7 +151,7 @@ class ExecutionMonitor:
         def check() -> None:
             self._check_clock()
             self._take(came, arrived)
-            self._seen = None if self._reporter.parameters.separation is None else body
+            self._seen = None if self._reporter.parameters.execution.separation is None else body
             if sights and self._watch.commitments.body is not None:
                 with suppress(Exception):
                     self._reporter.body_observed(self._watch.commitments.body)
@@ -406,7 +406,7 @@ class ExecutionMonitor:
     def _is_ray_clear(self) -> bool:
         """Return whether the pointing ray is known to be clear of the wearer."""
         parameters, now = self._reporter.parameters, self._now()
-        if parameters.separation is None:
+        if parameters.execution.separation is None:
             # Where a wearer is who was described once is not known either.
             return False
         try:

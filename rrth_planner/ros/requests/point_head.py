@@ -184,13 +184,12 @@ class PointHeadServer:
         if monitor.watch.goal is not goal:
             return ErrorCode.PREEMPTED, CANCELLED if is_cancelled else REPLACED
         now = self._node.get_clock().now().nanoseconds * 1e-9
-        rest_speed = self._reporter.parameters.rest_speed
-        if reading is not None and reading.is_moving(now, rest_speed):
+        if reading is not None and reading.is_moving(now):
             return None
         if reading is not None:
             # At rest the mean counts: encoders are noisy.
             arm = self._reporter.parameters.arm
-            angle = pointing_angle(arm, reading.mean_positions(rest_speed), goal.target)
+            angle = pointing_angle(arm, reading.mean_positions(), goal.target)
         if monitor.watch.is_active(now):
             is_early = time.monotonic() - pursuit.commanded < EARLIEST
             if is_early or is_cancelled or not monitor.watch.is_monitoring:
