@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A monitored arm without ROS and without a clock: what tests of decisions begin with."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from rrth_planner.collision import reference_checker
@@ -12,11 +12,11 @@ from rrth_planner.execution.decide import decide
 from rrth_planner.execution.event import Look, Moment, Sight
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.joint_reading import JointReading
-from rrth_planner.execution.watch import Watch
-from rrth_planner.model.arm import ArmModel
+from rrth_planner.execution.watch import PlainRules, Watch
 from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.required_clearance import RequiredClearance
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.trajectory import MotionLimits, sample, Trajectory
+from rrth_planner.model.trajectory import sample, Trajectory
 import worlds
 
 ARM = worlds.table_1_arm()
@@ -27,20 +27,12 @@ FAR = Scene((Box('far', [3.0, 3.0, 3.0], [0.1, 0.1, 0.1], np.eye(3)),))
 NOWHERE = Scene(())
 
 
-@dataclass(frozen=True, kw_only=True)
-class Rules:
-    """Of motions that are monitored as a whole, as `watch.MonitorRules` has them."""
-
-    arm: ArmModel = ARM
-    margin: float = 0.02
-    ray_guard_length: float = 1.0
-    stop_limits: MotionLimits = worlds.limits()
-    execution: ExecutionRules = ExecutionRules(None, 0.0, False)
-    stands_still: bool = False
-    replan: bool = True
-
-
-RULES = Rules()
+# Of motions that are monitored as a whole.
+RULES = PlainRules(
+    required=RequiredClearance(ARM, 0.02, 1.0),
+    stop_limits=worlds.limits(),
+    execution=ExecutionRules(None, 0.0, False),
+)
 
 
 def turn():

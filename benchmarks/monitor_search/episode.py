@@ -23,7 +23,15 @@ from rrth_planner.timing.parameterization import parameterize
 
 from benchmarks.monitor_search.judge import Found, Judge
 from benchmarks.monitor_search.wearer import Person
-from benchmarks.separation.setting import Case, FOLDED, MARGIN, RAY, separation_of, the_arm
+from benchmarks.separation.setting import (
+    Case,
+    FOLDED,
+    MARGIN,
+    RAY,
+    required,
+    separation_of,
+    the_arm,
+)
 
 # How long everything may go wrong, and how long nothing does after that [s].
 CHAOS, CALM = 15.0, 6.0
@@ -51,9 +59,7 @@ class Episode:
         self._separation = separation_of(case)
         execution = ExecutionRules(self._separation, delay, bool(rng.random() < 0.2))
         rules = PlainRules(
-            arm=the_arm(),
-            margin=MARGIN,
-            ray_guard_length=RAY,
+            required=required(),
             stop_limits=self._separation.stop_limits,
             execution=execution,
         )

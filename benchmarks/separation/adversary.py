@@ -57,7 +57,7 @@ from benchmarks.separation.setting import (
     FOLDED,
     MARGIN,
     random_plans,
-    RAY,
+    required,
     separation_of,
     the_arm,
     the_settings,
@@ -204,9 +204,7 @@ def chain_of_hands(trial: Trial, n: int, seed: int) -> Chain:
                 trajectory=plan.trajectory, start_time=0.0, target_distance=plan.target_distance
             )
             # One that is in the way even at rest, of the ray say, would stop every arm.
-            if not is_remaining_free(
-                whole, 0.0, the_arm(), scene, margin=MARGIN, ray_guard_length=RAY
-            ):
+            if not is_remaining_free(whole, 0.0, required(), scene):
                 continue
         name = scene.boxes[part].name
         speed = trial.speed * speed_bound(separation_of(trial.case).rules, name)
@@ -387,13 +385,7 @@ class _Episode:
         scene = scene_of_rows(self.wearer.names, self.eyes.rows)
         if self.monitored is None:
             settings = the_settings()
-            still = arm_at_rest(
-                self.settings.arm,
-                self.controller.place,
-                settings.limits,
-                margin=MARGIN,
-                ray_guard_length=RAY,
-            )
+            still = arm_at_rest(required(), self.controller.place, settings.limits)
             whole = ExecutingMotion(
                 trajectory=self.motion,
                 start_time=at,

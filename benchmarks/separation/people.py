@@ -43,9 +43,8 @@ from benchmarks.separation.lockstep import (
 from benchmarks.separation.setting import (
     Case,
     FOLDED,
-    MARGIN,
     planned,
-    RAY,
+    required,
     separation_of,
     the_arm,
     the_settings,
@@ -206,13 +205,7 @@ class Session:
         self.asked = self.tried = 0.0
         self.plan: MotionPlan | None = None
         self.ready = 0.0
-        self.monitored = arm_at_rest(
-            self.settings.arm,
-            FOLDED,
-            the_settings().limits,
-            margin=MARGIN,
-            ray_guard_length=RAY,
-        )
+        self.monitored = arm_at_rest(required(), FOLDED, the_settings().limits)
 
     def run(self, seconds: float) -> None:
         """Run for so long [s]."""
@@ -301,9 +294,7 @@ class Session:
             escape_time=self.plan.escape_time,
         )
         phase = min(planner.progress(time), self.plan.trajectory.duration)
-        is_free = is_remaining_free(
-            whole, phase, self.settings.arm, scene, margin=MARGIN, ray_guard_length=RAY
-        )
+        is_free = is_remaining_free(whole, phase, required(), scene)
         if is_free and time - self.asked <= PATIENCE:
             planner.frame(time, self.eyes)
         elif planner.is_at_rest(time):

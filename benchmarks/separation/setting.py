@@ -12,6 +12,7 @@ from rrth_planner.io.settings import load_settings, PlanSettings
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.required_clearance import RequiredClearance
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.separation import Separation, SeparationRules
 from rrth_planner.model.trajectory import MotionLimits
@@ -62,6 +63,12 @@ def the_arm() -> ArmModel:
 def the_settings() -> PlanSettings:
     """Return the packaged settings of plans."""
     return load_settings(the_arm().dof)
+
+
+@cache
+def required() -> RequiredClearance:
+    """Return what stays clear of the wearer."""
+    return RequiredClearance(the_arm(), MARGIN, RAY)
 
 
 @cache

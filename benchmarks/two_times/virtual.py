@@ -77,10 +77,10 @@ def again(
     """
     rules, recorded = course.rules, course.events
     delay = rules.execution.controller_delay
-    settings = load_settings(rules.arm.dof, seed=seed)
+    settings = load_settings(rules.required.arm.dof, seed=seed)
     parameters = RehearsedParameters(
         **{field.name: getattr(settings, field.name) for field in fields(settings)},
-        arm=rules.arm,
+        arm=rules.required.arm,
         stop_limits=rules.stop_limits,
         execution=rules.execution,
         body_timeout=BODY_TIMEOUT,

@@ -11,7 +11,7 @@ import numpy as np
 from rrth_planner.cli.joint_values import joint_values
 from rrth_planner.cli.program import say
 from rrth_planner.io.resources import resource_path
-from rrth_planner.io.settings import load_settings, PlanSettings
+from rrth_planner.io.settings import load_settings, PlanSettings, required_clearance
 from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.arm import ArmModel, tool_pose
 from rrth_planner.model.arrays import Array
@@ -60,9 +60,9 @@ def free_share_of(arm: ArmModel, scene: Scene, settings: PlanSettings, name: str
 
     prepare_kernels(partial(say, name))
     from rrth_planner.collision.free_share import free_share
-    from rrth_planner.collision.world import arm_world
+    from rrth_planner.collision.world import world_of
 
-    return free_share(arm_world(arm, scene, settings.margin, settings.ray_guard_length))
+    return free_share(world_of(required_clearance(arm, settings), scene))
 
 
 def free_start_of(

@@ -94,14 +94,11 @@ def _compare_on_recorded(incident: Incident, trajectory: Trajectory) -> 'MotionC
 
     question = incident.question
     return compare_checkers(
-        question.arm,
+        question.required,
         question.scene if incident.present is None else incident.present,
         question.goal,
         trajectory,
-        question.margin,
-        question.ray_guard_length,
         incident.escape_time,
-        question.second_checker,
     )
 
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Certificate, second checker and reference checker compared on each piece of a motion."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 
 import numpy as np
@@ -11,10 +11,11 @@ from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.second_checker import nearest
 from rrth_planner.collision.trajectory_validation import is_proven_free, violation_seen
 from rrth_planner.collision.violation import Violation
-from rrth_planner.collision.world import arm_world, World
-from rrth_planner.model.arm import ArmModel, reach_to
+from rrth_planner.collision.world import World, world_of
+from rrth_planner.model.arm import reach_to
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.required_clearance import RequiredClearance
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import positions_at, Trajectory
 
@@ -62,48 +63,44 @@ class MotionComparison:
 
 
 def compare_checkers(
-    arm: ArmModel,
+    required: RequiredClearance,
     scene: Scene,
     goal: PointingGoal,
     trajectory: Trajectory,
-    margin: float,
-    ray_guard_length: float,
     escape_time: float = 0.0,
-    library: str = 'fcl',
 ) -> MotionComparison:
     """
     Return the results of the three checkers for a motion.
 
-    Lengths in m, the scene in the base frame; the final ray must be clear as far as the target.
+    The scene is in the base frame [m]; the final ray must be clear as far as the target.
     Until `escape_time` [s] the motion escapes from boxes, so its pieces violate the margin.
     """
-    world = arm_world(arm, scene, margin, ray_guard_length)
+    arm, world = required.arm, world_of(required, scene)
     q_end: Array = trajectory.positions[-1]
     reach = reach_to(arm, goal.target, q_end)
     pieces = tuple(
-        _of_piece(arm, scene, world, trajectory, i, library)
-        for i in range(len(trajectory.times) - 1)
+        _of_piece(required, scene, world, trajectory, i) for i in range(len(trajectory.times) - 1)
     )
     end = trajectory.duration
     last = PieceComparison(
         begin=end,
         end=end,
         certificate='proven' if world.is_valid(q_end, reach) else 'violated',
-        second=_closest(arm, scene, q_end[None], np.array([end]), reach, library),
+        second=_closest(
+            replace(required, ray_guard_length=reach), scene, q_end[None], np.array([end])
+        ),
         reference=reference_checker.least_clearance(arm, scene, q_end[None], reach),
     )
     return MotionComparison(
-        is_proven=is_proven_free(world, trajectory, margin, reach, escape_time),
-        violation=violation_seen(
-            arm, scene, trajectory, margin, ray_guard_length, reach, escape_time, library
-        ),
+        is_proven=is_proven_free(world, trajectory, required.margin, reach, escape_time),
+        violation=violation_seen(required, scene, trajectory, reach, escape_time),
         clearance=min(piece.reference for piece in (*pieces, last)),
         pieces=(*pieces, last),
     )
 
 
 def _of_piece(
-    arm: ArmModel, scene: Scene, world: World, trajectory: Trajectory, i: int, library: str
+    required: RequiredClearance, scene: Scene, world: World, trajectory: Trajectory, i: int
 ) -> PieceComparison:
     begin, end = (float(time) for time in trajectory.times[i : i + 2])
     piece = Trajectory(
@@ -121,21 +118,19 @@ def _of_piece(
         begin=begin,
         end=end,
         certificate='proven' if certificate.is_proven else found,
-        second=_closest(
-            arm, scene, positions_at(piece, times), begin + times, world.ray_length, library
+        second=_closest(required, scene, positions_at(piece, times), begin + times),
+        reference=reference_checker.least_clearance(
+            required.arm, scene, q, required.ray_guard_length
         ),
-        reference=reference_checker.least_clearance(arm, scene, q, world.ray_length),
     )
 
 
-def _closest(
-    arm: ArmModel, scene: Scene, q: Array, times: Array, ray: float, library: str
-) -> Violation:
+def _closest(required: RequiredClearance, scene: Scene, q: Array, times: Array) -> Violation:
     """Return where the second checker finds the arm closest at instants, q (n, dof), times [s]."""
     best = Violation(float(times[0]), math.inf, '', '')
     # Without a box there is nothing to be close to.
     for time, one in zip(times.tolist(), q if scene.boxes else (), strict=False):
-        found = nearest(arm, scene, one, ray, library)
+        found = nearest(required, scene, one)
         if found.distance < best.distance:
             best = Violation(time, found.distance, found.bar, found.box)
     return best

@@ -25,6 +25,7 @@ from rrth_planner.collision.violation import Violation
 from rrth_planner.model.arm import ArmModel, bars_of, is_called
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.reach import reach_table
+from rrth_planner.model.required_clearance import RequiredClearance
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import part_of, piece_coefficients, positions_at, Trajectory
 
@@ -48,12 +49,10 @@ _THIRD = np.array([[6.0, 0.0, 0.0], [6.0, 12.0, 0.0], [6.0, 24.0, 60.0]])
 _CHORD = 0.125 / INTERVALS**2
 
 
-def nearest(
-    arm: ArmModel, scene: Scene, q: Array, ray_length: float, library: str = 'fcl'
-) -> Violation:
+def nearest(required: RequiredClearance, scene: Scene, q: Array) -> Violation:
     """Return the part of the arm and the box that are closest at q, shape (dof,)."""
-    boxes = boxes_of(scene, library)
-    bars = [PlacedBar(arm, k, ray_length, library) for k in range(len(bars_of(arm)))]
+    arm, boxes = required.arm, boxes_of(scene, required.library)
+    bars = _bars(required)
     placed = placements(arm, bars, q[None], [0] * len(bars))
     none = [0.0] * len(scene.boxes)
     found = [
@@ -99,6 +98,11 @@ def _reaches(arm: ArmModel, ray_length: float) -> Array:
     return reaches
 
 
+def _bars(required: RequiredClearance) -> list[PlacedBar]:
+    arm, ray, library = required.arm, required.ray_guard_length, required.library
+    return [PlacedBar(arm, k, ray, library) for k in range(len(bars_of(arm)))]
+
+
 class _Sample(NamedTuple):
     """
     The distances of a bar at an instant, given by its index.
@@ -136,19 +140,18 @@ class _Advancement:
 
     def __init__(
         self,
-        arm: ArmModel,
+        required: RequiredClearance,
         scene: Scene,
         trajectory: Trajectory,
         margins: Sequence[float],
-        ray_length: float,
-        library: str,
     ) -> None:
+        arm, ray_length, library = required.arm, required.ray_guard_length, required.library
         self._arm, self._trajectory, self._margins = arm, trajectory, margins
         self._library, self._boxes = library, boxes_of(scene, library)
         self.last = max(1, math.ceil(trajectory.duration / GRID_PERIOD))
         self._times = np.linspace(0.0, trajectory.duration, self.last + 1)
         self.displacements = displacements(arm, trajectory, self._times, ray_length)
-        self.bars = [PlacedBar(arm, k, ray_length, library) for k in range(len(bars_of(arm)))]
+        self.bars = _bars(required)
         self.parts: list[PlacedPart] = [*self.bars]
         self.parts += [
             PlacedPair(arm, pair, len(self.bars) + n, ray_length, library)
@@ -214,13 +217,7 @@ class _Advancement:
 
 
 def first_violation(
-    arm: ArmModel,
-    scene: Scene,
-    trajectory: Trajectory,
-    margin: float,
-    ray_guard_length: float,
-    reach: float,
-    library: str = 'fcl',
+    required: RequiredClearance, scene: Scene, trajectory: Trajectory, reach: float
 ) -> Violation | None:
     """
     Return the first clearance violation of a trajectory, or None.
@@ -230,13 +227,10 @@ def first_violation(
     them is sampled again, at intervals of `GRID_PERIOD` at least: each instant of that grid is
     checked or proven free.
 
-    The scene is in the base frame. margin: distance to keep from every box; ray_guard_length,
-    reach: how much of the ray must stay clear in motion, and at the end [m]; library: name of one
-    of `distance_library.LIBRARIES`.
+    The scene is in the base frame. reach: how much of the ray must be clear at the end [m].
     """
-    margins = [margin] * len(scene.boxes)
-    violation = _first(arm, scene, trajectory, margins, ray_guard_length, reach, library)
-    return None if violation is None else _from_body(violation, margin)
+    violation = _first(required, scene, trajectory, [required.margin] * len(scene.boxes), reach)
+    return None if violation is None else _from_body(violation, required.margin)
 
 
 def _from_body(violation: Violation, margin: float) -> Violation:
@@ -248,19 +242,17 @@ def _from_body(violation: Violation, margin: float) -> Violation:
 
 
 def _first(
-    arm: ArmModel,
+    required: RequiredClearance,
     scene: Scene,
     trajectory: Trajectory,
     margins: Sequence[float],
-    ray_length: float,
     reach: float,
-    library: str,
 ) -> Violation | None:
     """Return `first_violation` for a margin of each box, its distance beyond the margin [m]."""
-    advancement = _Advancement(arm, scene, trajectory, margins, ray_length, library)
+    advancement = _Advancement(required, scene, trajectory, margins)
     end = advancement.last
     starts = sorted({0, end // 2, end})
-    at_end = advancement.parts_at_end(reach) if reach > ray_length else []
+    at_end = advancement.parts_at_end(reach) if reach > required.ray_guard_length else []
     # All samples of a round are taken at once: the kinematics of one instant take as long as those
     # of a dozen.
     samples = iter(
@@ -284,14 +276,11 @@ def _first(
 
 
 def first_escape_violation(
-    arm: ArmModel,
+    required: RequiredClearance,
     scene: Scene,
     depths: Array,
     trajectory: Trajectory,
     escape_time: float,
-    margin: float,
-    ray_guard_length: float,
-    library: str = 'fcl',
 ) -> Violation | None:
     """
     Return the first violation of a motion that escapes from boxes, or None.
@@ -306,9 +295,9 @@ def first_escape_violation(
     if escape_time == 0.0:
         return None
     escape = part_of(trajectory, 0.0, escape_time)
-    is_void = _entered(arm, scene, trajectory.positions[0], ray_guard_length, library)
+    is_void, margin = _entered(required, scene, trajectory.positions[0]), required.margin
     violations = []
-    for ray, depth in ((0.0, depths[0]), (ray_guard_length, depths.max(axis=0))):
+    for ray, depth in ((0.0, depths[0]), (required.ray_guard_length, depths.max(axis=0))):
         boxes: list[Box] = []
         margins: list[float] = []
         kept: dict[str, float] = {}
@@ -328,23 +317,23 @@ def first_escape_violation(
             boxes.append(box)
             margins.append(apart)
             kept[box.name] = max(by, kept.get(box.name, by))
-        violation = _first(arm, Scene(tuple(boxes)), escape, margins, ray, 0.0, library)
+        judged = replace(required, ray_guard_length=ray)
+        violation = _first(judged, Scene(tuple(boxes)), escape, margins, 0.0)
         if violation is not None:
             violations.append(_from_body(violation, kept.get(violation.box, 0.0)))
     return min(violations, key=lambda violation: violation.time, default=None)
 
 
-def _entered(
-    arm: ArmModel, scene: Scene, q: Array, ray_length: float, library: str
-) -> NDArray[np.bool_]:
+def _entered(required: RequiredClearance, scene: Scene, q: Array) -> NDArray[np.bool_]:
     """Return which boxes the pointing ray is in at q, shape (dof,)."""
     # As in the separating axes, its radius grows the boxes.
+    arm, library = required.arm, required.library
     radius = float(arm.radii[-1])
     grown = [
         Box(box.name, box.center, box.size + 2.0 * radius, box.rotation) for box in scene.boxes
     ]
     distances = [-math.inf] * len(grown)
-    ray = PlacedBar(arm, len(bars_of(arm)) - 1, ray_length, library)
+    ray = PlacedBar(arm, len(bars_of(arm)) - 1, required.ray_guard_length, library)
     boxes = boxes_of(Scene(tuple(grown)), library)
     ray.nearest(boxes, distances, [0.0] * len(grown), placements(arm, [ray], q[None], [0]), q)
     return np.array(distances) <= DOUBT

@@ -8,8 +8,8 @@ from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.penetration import escape_depths, leads_out
 from rrth_planner.collision.second_checker import first_escape_violation, first_violation
 from rrth_planner.collision.violation import Violation
-from rrth_planner.collision.world import arm_world, World
-from rrth_planner.model.arm import ArmModel
+from rrth_planner.collision.world import World, world_of
+from rrth_planner.model.required_clearance import RequiredClearance
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import beyond, Trajectory
 
@@ -31,31 +31,24 @@ def is_proven_free(
 
 
 def violation_seen(
-    arm: ArmModel,
+    required: RequiredClearance,
     scene: Scene,
     trajectory: Trajectory,
-    margin: float,
-    ray_guard_length: float,
     reach: float,
     escape_time: float = 0.0,
-    library: str = 'fcl',
 ) -> Violation | None:
     """
     Return the first clearance violation of a motion by the second checker, or None.
 
     As `second_checker.first_violation`; reach and escape_time as in `is_proven_free`.
     """
-    ray = ray_guard_length
     if escape_time > 0.0:
-        world = arm_world(arm, scene, margin, ray)
-        depths = escape_depths(world, trajectory.positions[0])
-        violation = first_escape_violation(
-            arm, scene, depths, trajectory, escape_time, margin, ray, library
-        )
+        depths = escape_depths(world_of(required, scene), trajectory.positions[0])
+        violation = first_escape_violation(required, scene, depths, trajectory, escape_time)
         if violation is not None:
             return violation
     after = beyond(trajectory, escape_time)
-    violation = first_violation(arm, scene, after, margin, ray, reach, library)
+    violation = first_violation(required, scene, after, reach)
     if violation is None:
         return None
     return replace(violation, time=escape_time + violation.time)

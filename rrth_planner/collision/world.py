@@ -30,6 +30,7 @@ from rrth_planner.model.errors import check_type, OptionsError, RrthError
 from rrth_planner.model.frozen import Frozen, read_only
 from rrth_planner.model.joint_range import bounds_from
 from rrth_planner.model.reach import reach_table
+from rrth_planner.model.required_clearance import RequiredClearance
 from rrth_planner.model.scene import Scene
 
 # Rounding of kinematics and of the separating axes, with room: coordinates up to 1e4 m carry
@@ -226,15 +227,16 @@ def arm_world(arm: ArmModel, scene: Scene, margin: float, ray_guard_length: floa
         A margin or a ray_guard_length that is negative, not a number or beyond 1e4 m.
 
     """
-    check_type(arm, ArmModel, 'arm')
+    return world_of(RequiredClearance(arm, margin, ray_guard_length), scene)
+
+
+def world_of(required: RequiredClearance, scene: Scene) -> World:
+    """Return the `arm_world` of what has to stay clear of the boxes of a scene."""
     check_type(scene, Scene, 'scene')
-    margin = float_number(margin, 'margin', 'm', 0.0, FARTHEST, OptionsError)
-    ray_guard_length = float_number(
-        ray_guard_length, 'ray_guard_length', 'm', 0.0, FARTHEST, OptionsError
-    )
-    robot, compiled_chain = arm_rows(arm, ray_guard_length)
+    arm, margin = required.arm, required.margin + SLACK
+    robot, compiled_chain = arm_rows(arm, required.ray_guard_length)
     rows = np.empty((layout.BOX_ROWS, len(scene.boxes)))
-    rows_of(scene.numbers, allowed_bars(arm, scene), mount_inverse(arm), margin + SLACK, rows)
+    rows_of(scene.numbers, allowed_bars(arm, scene), mount_inverse(arm), margin, rows)
     obstacles, lanes = pack_boxes(rows)
     return World(
         bounds=arm.bounds,

@@ -340,14 +340,8 @@ def _may_go_on(watch: Watch, at: Moment, phase: float, scene: Scene) -> bool:
 
 def _is_arm_free(watch: Watch, at: Moment, scene: Scene) -> bool:
     """Return whether the arm is clear of the wearer where it is, maybe off its motion."""
-    rules = watch.rules
-    return at.reading is None or is_place_free(
-        at.reading.positions,
-        rules.arm,
-        scene,
-        MARGIN_LEFT * rules.margin,
-        rules.ray_guard_length,
-    )
+    left = changed(watch.rules.required, margin=MARGIN_LEFT * watch.rules.required.margin)
+    return at.reading is None or is_place_free(at.reading.positions, left, scene)
 
 
 def _always(_: Trajectory) -> bool:

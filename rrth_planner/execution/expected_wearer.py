@@ -9,7 +9,7 @@ from rrth_planner.execution.body_motion import places_of
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.remaining_motion import is_remaining_free
 from rrth_planner.kernels.layout import MAX_BOXES, SIZE
-from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.required_clearance import RequiredClearance
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import part_of
 
@@ -43,13 +43,7 @@ def expected_scene(before: Scene, present: Scene, elapsed: float) -> Scene:
 
 
 def is_expected_free(
-    running: ExecutingMotion,
-    phase: float,
-    arm: ArmModel,
-    expected: Scene,
-    *,
-    margin: float,
-    ray_guard_length: float,
+    running: ExecutingMotion, phase: float, required: RequiredClearance, expected: Scene
 ) -> bool:
     """
     Return whether the next stretch of a motion is free of where the wearer is expected.
@@ -61,6 +55,4 @@ def is_expected_free(
         return True
     stretch = part_of(running.trajectory, phase, phase + AHEAD[-1])
     ahead = replace(running, trajectory=stretch, target_distance=0.0, escape_time=0.0)
-    return is_remaining_free(
-        ahead, 0.0, arm, expected, margin=margin, ray_guard_length=ray_guard_length
-    )
+    return is_remaining_free(ahead, 0.0, required, expected)

@@ -7,7 +7,7 @@ from contextlib import suppress
 import traceback
 
 from rrth_planner.collision.certificate import least_clearance
-from rrth_planner.collision.world import arm_world
+from rrth_planner.collision.world import world_of
 from rrth_planner.execution import commitments as given
 from rrth_planner.execution.command import stop_along
 from rrth_planner.execution.decision import Command, Decision, Line
@@ -123,8 +123,7 @@ def _said_for_body(
 
 def said_unproven(watch: Watch, event: StopUnproven) -> Decision:
     """Say how near a commanded stop comes that is not proven free."""
-    rules = watch.rules
-    world = arm_world(rules.arm, event.scene, 0.0, rules.ray_guard_length)
+    world = world_of(changed(watch.rules.required, margin=0.0), event.scene)
     clearance = least_clearance(event.stop.trajectory, world)
     sentence = (
         f'{watch.sentence}; the stop is not proven free either, least clearance {clearance:.4f} m'
@@ -295,12 +294,4 @@ def holds(
     watch: Watch, check: Check, running: ExecutingMotion, phase: float, scene: Scene
 ) -> bool:
     """Return the verdict of a check of a motion from a phase on [s]."""
-    rules = watch.rules
-    return check(
-        running,
-        phase,
-        rules.arm,
-        scene,
-        margin=rules.margin,
-        ray_guard_length=rules.ray_guard_length,
-    )
+    return check(running, phase, watch.rules.required, scene)

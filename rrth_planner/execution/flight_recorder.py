@@ -195,7 +195,7 @@ class _Writer(pickle.Pickler):
 
     def persistent_id(self, value: Any) -> int | None:
         """Return the number of rules."""
-        if not hasattr(type(value), 'ray_guard_length') or not hasattr(value, 'replan'):
+        if not hasattr(type(value), 'stands_still') or not hasattr(value, 'replan'):
             return None
         return self._number(value)
 

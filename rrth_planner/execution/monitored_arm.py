@@ -10,8 +10,8 @@ from rrth_planner.execution.remaining_motion import (
     escapes_by_continuing,
     is_remaining_free,
 )
-from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.required_clearance import RequiredClearance
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import MotionLimits
 
@@ -23,17 +23,13 @@ class MonitoredArm:
 
     Parameters
     ----------
-    margin, ray_guard_length : float
-        Clearance from every box, and how much of the pointing ray stays clear in motion [m].
     motion : ExecutingMotion or None
         None: none for the present target.
 
     """
 
-    arm: ArmModel
+    required: RequiredClearance
     limits: MotionLimits
-    margin: float
-    ray_guard_length: float
     playback: Playback
     motion: ExecutingMotion | None = None
 
@@ -53,17 +49,9 @@ class MonitoredArm:
         return is_stopped or not _is_free(self, scene, time)
 
 
-def arm_at_rest(
-    arm: ArmModel, q: Array, limits: MotionLimits, *, margin: float, ray_guard_length: float
-) -> MonitoredArm:
+def arm_at_rest(required: RequiredClearance, q: Array, limits: MotionLimits) -> MonitoredArm:
     """Return an arm that stands still at q, (dof,) [rad], without a target."""
-    return MonitoredArm(
-        arm=arm,
-        limits=limits,
-        margin=margin,
-        ray_guard_length=ray_guard_length,
-        playback=standing(q),
-    )
+    return MonitoredArm(required=required, limits=limits, playback=standing(q))
 
 
 def monitored(state: MonitoredArm, scene: Scene, time: float) -> MonitoredArm:
@@ -71,12 +59,7 @@ def monitored(state: MonitoredArm, scene: Scene, time: float) -> MonitoredArm:
     if state.motion is None or state.playback.is_stopping or state.is_at_rest(time):
         return state
     if _is_free(state, scene, time) or escapes_by_continuing(
-        state.motion,
-        time - state.motion.start_time,
-        state.arm,
-        scene,
-        margin=state.margin,
-        ray_guard_length=state.ray_guard_length,
+        state.motion, time - state.motion.start_time, state.required, scene
     ):
         return state
     return replace(state, playback=stop(state.playback, state.limits, time))
@@ -100,11 +83,4 @@ def _is_free(state: MonitoredArm, scene: Scene, time: float) -> bool:
     """Return whether the rest of the motion, and its end, are proven free of the wearer."""
     assert state.motion is not None
     phase = min(time - state.motion.start_time, state.motion.trajectory.duration)
-    return is_remaining_free(
-        state.motion,
-        phase,
-        state.arm,
-        scene,
-        margin=state.margin,
-        ray_guard_length=state.ray_guard_length,
-    )
+    return is_remaining_free(state.motion, phase, state.required, scene)

@@ -9,16 +9,16 @@ from rrth_planner.collision.penetration import gets_no_deeper, leads_out
 from rrth_planner.collision.world import (
     allowed_bars,
     arm_rows,
-    arm_world,
     mount_inverse,
     RESOLUTION,
     SLACK,
     without_ray,
+    world_of,
 )
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.kernels.collision import trajectory_check
-from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.required_clearance import RequiredClearance
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import (
     positions_at,
@@ -26,31 +26,24 @@ from rrth_planner.model.trajectory import (
 
 
 def is_remaining_free(
-    running: ExecutingMotion,
-    phase: float,
-    arm: ArmModel,
-    scene: Scene,
-    *,
-    margin: float,
-    ray_guard_length: float,
+    running: ExecutingMotion, phase: float, required: RequiredClearance, scene: Scene
 ) -> bool:
     """
     Return whether the remaining motion is proven free of the present wearer.
 
-    The arm is at a time `phase` within it [s], the scene is in the base frame, `margin` and
-    `ray_guard_length` are in metres. At the end the ray must be free up to the target.
+    The arm is at a time `phase` within it [s], the scene is in the base frame. At the end the ray
+    must be free up to the target.
     """
-    trajectory, begin = running.trajectory, phase
+    trajectory, begin, arm = running.trajectory, phase, required.arm
     if phase < running.escape_time:
-        world = arm_world(arm, scene, margin, ray_guard_length)
-        if not leads_out(trajectory, world, margin, running.escape_time, phase):
+        world = world_of(required, scene)
+        if not leads_out(trajectory, world, required.margin, running.escape_time, phase):
             return False
         begin = running.escape_time
     if len(trajectory.times) == 1:
-        world = arm_world(arm, scene, margin, ray_guard_length)
-        reach = max(ray_guard_length, running.target_distance)
-        return world.is_free(trajectory.positions[0], reach)
-    robot, chain = arm_rows(arm, ray_guard_length)
+        reach = max(required.ray_guard_length, running.target_distance)
+        return world_of(required, scene).is_free(trajectory.positions[0], reach)
+    robot, chain = arm_rows(arm, required.ray_guard_length)
     return bool(
         trajectory_check.is_remaining_motion_free(
             trajectory.times,
@@ -65,7 +58,7 @@ def is_remaining_free(
             scene.numbers,
             allowed_bars(arm, scene),
             mount_inverse(arm),
-            margin + SLACK,
+            required.margin + SLACK,
             tree_depth(len(scene.boxes)),
             BERNSTEIN_4,
             BERNSTEIN_3,
@@ -74,13 +67,7 @@ def is_remaining_free(
 
 
 def escapes_by_continuing(
-    running: ExecutingMotion,
-    phase: float,
-    arm: ArmModel,
-    scene: Scene,
-    *,
-    margin: float,
-    ray_guard_length: float,
+    running: ExecutingMotion, phase: float, required: RequiredClearance, scene: Scene
 ) -> bool:
     """
     Return whether the arm violates the margin now, and is proven to escape by continuing.
@@ -94,10 +81,10 @@ def escapes_by_continuing(
     trajectory = running.trajectory
     here = positions_at(trajectory, [phase])[0]
     # Most often it is, and a stop waits for the answer.
-    if is_place_free(here, arm, scene, margin, ray_guard_length):
+    if is_place_free(here, required, scene):
         return False
-    world = arm_world(arm, scene, margin, ray_guard_length)
-    reach = max(ray_guard_length, running.target_distance)
+    world, margin = world_of(required, scene), required.margin
+    reach = max(required.ray_guard_length, running.target_distance)
     return (
         world.is_free(trajectory.positions[-1], reach)
         and leads_out(trajectory, without_ray(world), margin, trajectory.duration, phase)
@@ -105,35 +92,27 @@ def escapes_by_continuing(
     )
 
 
-def is_ray_clear(
-    q: Array, arm: ArmModel, scene: Scene, margin: float, ray_guard_length: float
-) -> bool:
-    """Return whether the pointing ray of an arm at q, (dof,), is clear by a margin [m]."""
-    world = arm_world(arm, scene, margin, ray_guard_length)
-    return bool(world.clearances(q)[-1].min(initial=np.inf) > 0.0)
+def is_ray_clear(q: Array, required: RequiredClearance, scene: Scene) -> bool:
+    """Return whether the pointing ray of an arm at q, (dof,), is clear by the margin."""
+    return bool(world_of(required, scene).clearances(q)[-1].min(initial=np.inf) > 0.0)
 
 
-def is_place_free(
-    q: Array, arm: ArmModel, scene: Scene, margin: float, ray_guard_length: float
-) -> bool:
-    """
-    Return whether the arm is free at q, shape (dof,) [rad], regardless of its joint limits.
-
-    With the margin, and with the pointing ray up to `ray_guard_length` [m].
-    """
-    robot, chain = arm_rows(arm, ray_guard_length)
+def is_place_free(q: Array, required: RequiredClearance, scene: Scene) -> bool:
+    """Return whether the arm is free at q, shape (dof,) [rad], regardless of its joint limits."""
+    arm, ray = required.arm, required.ray_guard_length
+    robot, chain = arm_rows(arm, ray)
     boxes, T_arm_base = scene.numbers, mount_inverse(arm)
     depth = tree_depth(len(scene.boxes))
     return bool(
         trajectory_check.is_place_free(
             q,
-            ray_guard_length,
+            ray,
             chain,
             robot,
             boxes,
             allowed_bars(arm, scene),
             T_arm_base,
-            margin + SLACK,
+            required.margin + SLACK,
             depth,
         )
     )

@@ -11,9 +11,9 @@ from rrth_planner.execution.commitments import Commitments, ExecutionRules
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.separation_status import SeparationStatus
 from rrth_planner.execution.tracked_motion import TrackedMotion
-from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.frozen import changed
 from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.required_clearance import RequiredClearance
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
 
@@ -44,16 +44,8 @@ class MonitorRules(Protocol):
     """What decisions take of the parameters of a motion's plan, or of those in effect."""
 
     @property
-    def arm(self) -> ArmModel:
-        """The arm that is worn."""
-
-    @property
-    def margin(self) -> float:
-        """Clearance from every box [m]."""
-
-    @property
-    def ray_guard_length(self) -> float:
-        """How much of the pointing ray stays clear in motion [m]."""
+    def required(self) -> RequiredClearance:
+        """What stays clear of the wearer."""
 
     @property
     def stop_limits(self) -> MotionLimits:
@@ -76,9 +68,7 @@ class MonitorRules(Protocol):
 class PlainRules:
     """The rules by themselves, without a node."""
 
-    arm: ArmModel
-    margin: float
-    ray_guard_length: float
+    required: RequiredClearance
     stop_limits: MotionLimits
     execution: ExecutionRules
     stands_still: bool = False
@@ -88,9 +78,7 @@ class PlainRules:
 def plain(rules: MonitorRules) -> PlainRules:
     """Return rules by themselves."""
     return PlainRules(
-        arm=rules.arm,
-        margin=rules.margin,
-        ray_guard_length=rules.ray_guard_length,
+        required=rules.required,
         stop_limits=rules.stop_limits,
         execution=rules.execution,
         stands_still=rules.stands_still,

@@ -4,6 +4,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,10 @@ from rrth_planner.collision.distance_library import LIBRARIES
 from rrth_planner.io.entries import number, text, whole
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.text_file import load_yaml, naming_file
+from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import OptionsError, shown
+from rrth_planner.model.required_clearance import RequiredClearance
 from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.planning.options import ALGORITHMS, TreeOptions
 
@@ -34,6 +37,15 @@ class PlanSettings:
     second_checker: str
     limits: MotionLimits
     options: TreeOptions
+
+
+# Of the same parameters it is asked with each body.
+@lru_cache(maxsize=8)
+def required_clearance(arm: ArmModel, settings: PlanSettings) -> RequiredClearance:
+    """Return what stays clear of the wearer by settings for an arm."""
+    return RequiredClearance(
+        arm, settings.margin, settings.ray_guard_length, settings.second_checker
+    )
 
 
 def settings_from_values(values: Mapping[str, Any], dof: int) -> PlanSettings:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from rrth_planner.collision.certificate import certify, least_clearance
 from rrth_planner.collision.penetration import box_depths
 from rrth_planner.collision.violation import Disagreement
-from rrth_planner.collision.world import arm_world, grown, with_start, World
+from rrth_planner.collision.world import grown, with_start, World, world_of
 from rrth_planner.kernels import jit
 from rrth_planner.model.arm import ArmModel, reach_to, tool_pose
 from rrth_planner.model.arrays import Array
@@ -48,7 +48,7 @@ from rrth_planner.planning.pointing_goals import check_pointing_arm
 from rrth_planner.timing.lead_in import lead_in, LeadIn, stop_first
 
 # A wearer at rest makes the same world from plan to plan.
-_world_of = functools.lru_cache(maxsize=8)(arm_world)
+_world_of = functools.lru_cache(maxsize=8)(world_of)
 
 
 def plan_motion(
@@ -153,7 +153,7 @@ def plan_question(
     begin = time.perf_counter()
     arm, scene, margin, moving = question.arm, question.scene, question.margin, question.moving
     q_start = within_limits(arm, question.q_start)
-    world = _world_of(arm, scene, margin, question.ray_guard_length)
+    world = _world_of(question.required, scene)
     escape, disagreement = None, None
     leads: Iterable[LeadIn | None | Rejection] = (None,)
     # A joint may begin a little beyond its limit: straight edges lead it in.

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 from rrth_planner.collision.violation import Violation
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.errors import RrthError
+from rrth_planner.model.required_clearance import RequiredClearance
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.pipeline.channel import Channel, Raised, STOP
@@ -55,14 +56,11 @@ class Planner(Protocol):
 
     def violation_seen(
         self,
-        arm: ArmModel,
+        required: RequiredClearance,
         scene: Scene,
         trajectory: Trajectory,
-        margin: float,
-        ray_guard_length: float,
         reach: float,
         escape_time: float = 0.0,
-        library: str = 'fcl',
     ) -> Violation | None:
         """Return what `trajectory_validation.violation_seen` returns for the same arguments."""
 
@@ -115,9 +113,11 @@ class PlanningProcess:
         plan: MotionPlan = self._ask(longest, 'plan', *parts_of(question), should_stop=should_stop)
         return plan
 
-    def violation_seen(self, *arguments: Any) -> Violation | None:
+    def violation_seen(self, required: RequiredClearance, *others: Any) -> Violation | None:
         """As of `Planner`."""
-        violation: Violation | None = self._ask(LONGEST_STOP, 'violation_seen', *arguments)
+        # Its arm is a part of the message, and sent once.
+        parts = required.arm, required.margin, required.ray_guard_length, required.library
+        violation: Violation | None = self._ask(LONGEST_STOP, 'violation_seen', *parts, *others)
         return violation
 
     def close(self) -> None:

@@ -14,6 +14,7 @@ from typing import Any, TYPE_CHECKING
 
 from rrth_planner.kernels.jit import is_compiled
 from rrth_planner.model.errors import one_line
+from rrth_planner.model.required_clearance import RequiredClearance
 from rrth_planner.pipeline.channel import Channel, Raised, STOP
 from rrth_planner.pipeline.request import asked
 
@@ -33,7 +34,9 @@ def main() -> None:
         'warm_up': lambda *arguments: _planner().warm_up(*arguments),
         # Whatever comes meanwhile is a STOP, or the end of the owner.
         'plan': lambda *parts: _planner().plan(asked(parts), lambda: channel.is_readable(0.0)),
-        'violation_seen': lambda *arguments: _planner().violation_seen(*arguments),
+        'violation_seen': lambda arm, margin, ray, library, *others: _planner().violation_seen(
+            RequiredClearance(arm, margin, ray, library), *others
+        ),
     }
     serve(channel, work)
 

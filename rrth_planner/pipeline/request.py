@@ -14,6 +14,7 @@ from rrth_planner.model.arrays import Array, FARTHEST, float_number, frozen_arra
 from rrth_planner.model.errors import check_type, OptionsError, shown
 from rrth_planner.model.frozen import Frozen
 from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.required_clearance import RequiredClearance
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.separation import SeparationRules
 from rrth_planner.model.trajectory import MotionLimits, StartState
@@ -81,6 +82,11 @@ class PlanQuestion(Frozen):
     rules: SeparationRules | None = None
     stop_limits: MotionLimits | None = None
     body_age: float = 0.0
+
+    @property
+    def required(self) -> RequiredClearance:
+        """What stays clear of the wearer."""
+        return RequiredClearance(self.arm, self.margin, self.ray_guard_length, self.second_checker)
 
     def __post_init__(self) -> None:
         """Validate and freeze."""

@@ -95,16 +95,7 @@ def time_path(
         )
     if should_stop():
         return CANCELLED
-    violation = violation_seen(
-        question.arm,
-        question.scene,
-        trajectory,
-        question.margin,
-        question.ray_guard_length,
-        reach,
-        escape_time,
-        question.second_checker,
-    )
+    violation = violation_seen(question.required, question.scene, trajectory, reach, escape_time)
     if should_stop():
         return CANCELLED
     if violation is not None:

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rrth_planner.execution.commitments import ExecutionRules
-from rrth_planner.io.settings import PlanSettings
+from rrth_planner.io.settings import PlanSettings, required_clearance
 from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.required_clearance import RequiredClearance
 from rrth_planner.model.trajectory import MotionLimits
 
 
@@ -41,6 +42,11 @@ class RehearsedParameters(PlanSettings):
     replan: bool = True
     required_boxes: tuple[str, ...] = ()
     separates: str = 'true'
+
+    @property
+    def required(self) -> RequiredClearance:
+        """What stays clear of the wearer."""
+        return required_clearance(self.arm, self)
 
     @property
     def incident_path(self) -> Path:

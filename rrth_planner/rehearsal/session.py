@@ -235,7 +235,7 @@ class Session:
 
     def _aims(self, target: Array) -> bool:
         reading = self.world.reading
-        arm = self.world.rules.arm
+        arm = self.world.rules.required.arm
         return reading is not None and pointing_error(arm, reading.positions, target) < AIMS
 
 

@@ -143,7 +143,7 @@ class Witness:
         seen, self._seen = _with_middles(self._seen[:n]), self._seen[n:]
         if not seen:
             return
-        arm, names, found = self._world.rules.arm, self._truth.names, self.testimony
+        arm, names, found = self._world.rules.required.arm, self._truth.names, self.testimony
         q, v = np.array([one[1] for one in seen]), np.array([one[2] for one in seen])
         times = np.array([one[0] for one in seen])
         rows = np.nan_to_num(np.array([self._truth.rows_at(time) for time in times]), nan=1e3)
@@ -164,7 +164,7 @@ class Witness:
         found.moving_seconds += float(is_moving.sum()) * period
         some = np.flatnonzero(is_moving)[::SPARSE]
         if len(some):
-            length = self._world.rules.ray_guard_length
+            length = self._world.rules.required.ray_guard_length
             ray = bars(arm, q[some], length)[:, -1]
             half = 0.5 * rows[some][:, :, SIZE:ROTATION] + bar_radii(arm)[-1]
             turns = rows[some][:, :, ROTATION:].reshape(len(some), -1, 3, 3)

@@ -91,25 +91,24 @@ async def incident_of_stop(stop: Stop, host: Host) -> Incident | None:
     if stop.scene is None or stop.goal is None:
         return None
     parameters, trajectory = cast(RequestParameters, stop.parameters), stop.trajectory
-    arm, margin, ray = parameters.arm, parameters.margin, parameters.ray_guard_length
-    library = parameters.second_checker
+    required = parameters.required
     violation = await host.violation_seen(
-        arm, stop.scene, trajectory, margin, ray, ray, 0.0, library
+        required, stop.scene, trajectory, required.ray_guard_length
     )
     if violation is None:
         return None
     question = PlanQuestion(
-        arm=arm,
+        arm=required.arm,
         scene=stop.scene,
         q_start=trajectory.positions[0],
         goal=stop.goal,
         limits=parameters.limits,
         options=parameters.options,
-        margin=margin,
-        ray_guard_length=ray,
+        margin=required.margin,
+        ray_guard_length=required.ray_guard_length,
         seed=max(0, parameters.seed),
         escape_depth=parameters.escape_depth,
         reserve=parameters.reserve,
-        second_checker=parameters.second_checker,
+        second_checker=required.library,
     )
     return disagreement_incident(question, Disagreement(trajectory, violation))

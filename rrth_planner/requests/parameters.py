@@ -34,10 +34,6 @@ class RequestParameters(MonitorRules, Protocol):
         """Clearance beyond the margin that a path is given where there is room [m]."""
 
     @property
-    def second_checker(self) -> str:
-        """The library that checks motions again."""
-
-    @property
     def start_tolerance(self) -> float:
         """Greatest distance of a joint from where its motion begins [rad]."""
 

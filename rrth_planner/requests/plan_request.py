@@ -184,7 +184,7 @@ def _handover(
 ) -> Handover:
     """Return the handover from a moving arm at about a time [s]."""
     delay = parameters.execution.controller_delay
-    start = snapshot.start_state_at(running, time, parameters.arm, delay)
+    start = snapshot.start_state_at(running, time, parameters.required.arm, delay)
     is_commanded = snapshot.is_commanded(running, delay) and start.running is not None
     if is_commanded and running is not None and start.time < running.trajectory.duration:
         # Numbers of seconds since 1970 are 0.24 us apart: the state is that of such a one.
@@ -204,22 +204,22 @@ def _question(
     body_age: float,
     seed: int,
 ) -> PlanQuestion:
-    separation = parameters.execution.separation
+    required, separation = parameters.required, parameters.execution.separation
     return PlanQuestion(
-        arm=parameters.arm,
+        arm=required.arm,
         scene=snapshot.scene,
         q_start=q_start,
         # Its pace is in the limits.
         goal=PointingGoal(snapshot.goal.target),
         limits=limits_of(parameters.limits, snapshot.goal),
         options=parameters.options,
-        margin=parameters.margin,
-        ray_guard_length=parameters.ray_guard_length,
+        margin=required.margin,
+        ray_guard_length=required.ray_guard_length,
         seed=seed,
         moving=None if handover is None else handover.start_state,
         escape_depth=parameters.escape_depth,
         reserve=parameters.reserve,
-        second_checker=parameters.second_checker,
+        second_checker=required.library,
         rules=None if separation is None else separation.rules,
         stop_limits=parameters.stop_limits,
         body_age=min(max(body_age, 0.0), FARTHEST),

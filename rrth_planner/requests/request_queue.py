@@ -353,7 +353,7 @@ class PlanQueue:
 
     def _is_ray_crossed(self, parameters: RequestParameters) -> bool:
         """Return whether the arm rests, clear of the wearer but for its pointing ray."""
-        now, arm = self._host.now(), parameters.arm
+        now, required = self._host.now(), parameters.required
         try:
             joints = self._inputs.joints_at(now, parameters.joint_timeout)
             scene = self._inputs.scene_at(now, parameters)
@@ -362,9 +362,8 @@ class PlanQueue:
         if joints.is_moving(now):
             return False
         q = joints.mean_positions()
-        margin, length = parameters.margin, parameters.ray_guard_length
-        is_free = is_place_free(q, arm, scene, margin, length)
-        return not is_free and is_place_free(q, arm, scene, margin, 0.0)
+        is_free = is_place_free(q, required, scene)
+        return not is_free and is_place_free(q, replace(required, ray_guard_length=0.0), scene)
 
     def _publish(
         self,

@@ -8,7 +8,7 @@ import numpy as np
 from rrth_planner.collision.penetration import escape_depths
 from rrth_planner.collision.trajectory_validation import is_proven_free
 from rrth_planner.collision.violation import Disagreement
-from rrth_planner.collision.world import arm_world
+from rrth_planner.collision.world import world_of
 from rrth_planner.execution.command import ahead
 from rrth_planner.execution.decide import MARGIN_LEFT
 from rrth_planner.execution.executing_motion import ExecutingMotion, FOLLOWS
@@ -18,6 +18,7 @@ from rrth_planner.execution.remaining_motion import is_place_free
 from rrth_planner.execution.tracked_motion import OFF_COMMAND
 from rrth_planner.model.arm import reach_to
 from rrth_planner.model.errors import RequestError
+from rrth_planner.model.frozen import changed
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.status import ErrorCode
 from rrth_planner.model.trajectory import Trajectory
@@ -70,14 +71,11 @@ class Revalidation:
         scene = self.require_fit()
         parameters = self.parameters
         violation = await self.host.violation_seen(
-            parameters.arm,
+            parameters.required,
             scene,
             self._motion,
-            parameters.margin,
-            parameters.ray_guard_length,
             self._target_distance,
             self.plan.escape_time,
-            parameters.second_checker,
         )
         if violation is None:
             return None
@@ -105,7 +103,7 @@ class Revalidation:
 
     def _require_arm(self, present: InputSnapshot, now: float) -> None:
         """Raise ArmHasMoved where the arm is not at the start of the motion."""
-        snapshot, handover, arm = self.snapshot, self.handover, self.parameters.arm
+        snapshot, handover, arm = self.snapshot, self.handover, self.parameters.required.arm
         delay = self.parameters.execution.controller_delay
         expected, what = snapshot.q_start, 'moved by'
         place, tolerance = present.q_start, self.parameters.start_tolerance
@@ -151,11 +149,10 @@ class Revalidation:
 
     def _require_clear(self, present: InputSnapshot) -> None:
         """Raise RequestError where the arm, beside what it is commanded, is near the wearer."""
-        parameters = self.parameters
-        left = MARGIN_LEFT * parameters.margin
-        q = present.joints.positions
+        required = self.parameters.required
+        left = MARGIN_LEFT * required.margin
         if self.plan.escape_time == 0.0 and not is_place_free(
-            q, parameters.arm, present.scene, left, parameters.ray_guard_length
+            present.joints.positions, changed(required, margin=left), present.scene
         ):
             raise RequestError(
                 ErrorCode.START_STATE_IN_COLLISION,
@@ -166,14 +163,14 @@ class Revalidation:
     def _require_proof(self, scene: Scene) -> None:
         """Raise RequestError where the motion is not proven free of a wearer."""
         parameters = self.parameters
-        world = arm_world(parameters.arm, scene, parameters.margin, parameters.ray_guard_length)
+        world = world_of(parameters.required, scene)
         escape_time = self.plan.escape_time
         is_too_deep = (
             escape_time > 0.0
             and escape_depths(world, self._motion.positions[0])[0].max() >= parameters.escape_depth
         )
         if is_too_deep or not is_proven_free(
-            world, self._motion, parameters.margin, self._target_distance, escape_time
+            world, self._motion, parameters.required.margin, self._target_distance, escape_time
         ):
             raise RequestError(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
@@ -183,18 +180,11 @@ class Revalidation:
 
     def _require_room(self) -> None:
         """Raise RequestError where a moving part is about to come into the way of the motion."""
-        parameters = self.parameters
         motion = ExecutingMotion(
             trajectory=self._motion, start_time=0.0, escape_time=self.plan.escape_time
         )
-        if not is_expected_free(
-            motion,
-            0.0,
-            parameters.arm,
-            self.inputs.expected_scene(),
-            margin=parameters.margin,
-            ray_guard_length=parameters.ray_guard_length,
-        ):
+        required, expected = self.parameters.required, self.inputs.expected_scene()
+        if not is_expected_free(motion, 0.0, required, expected):
             raise RequestError(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
                 'the wearer is about to move into the path of the arm',
@@ -209,4 +199,4 @@ class Revalidation:
     @property
     def _target_distance(self) -> float:
         target = self.snapshot.goal.target
-        return reach_to(self.parameters.arm, target, self._motion.positions[-1])
+        return reach_to(self.parameters.required.arm, target, self._motion.positions[-1])

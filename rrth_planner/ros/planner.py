@@ -83,13 +83,7 @@ class PlannerNode(Node):
         try:
             self._create_components(parameters)
             # In this process, while the other one loads.
-            warm_up(
-                parameters.arm,
-                parameters.stop_limits,
-                parameters.margin,
-                parameters.ray_guard_length,
-                parameters.execution.separation,
-            )
+            warm_up(parameters.required, parameters.stop_limits, parameters.execution.separation)
             self._planner.warm_up(parameters.arm, parameters.options, parameters.second_checker)
         except BaseException:
             self._planner.close()

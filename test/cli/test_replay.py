@@ -164,7 +164,7 @@ def test_a_motion_with_an_escape_is_checked_as_one(monkeypatch, capsys):
 
 def test_all_checkers_agree_on_every_piece(monkeypatch):
     trajectory = disagreement(monkeypatch).trajectory
-    arguments = (table_1_arm(), wearer(), QUESTION.goal, trajectory, MARGIN, RAY)
+    arguments = (QUESTION.required, wearer(), QUESTION.goal, trajectory)
     comparison = checker_comparison.compare_checkers(*arguments)
     assert comparison.is_proven
     assert comparison.violation is None
@@ -188,7 +188,7 @@ def test_a_motion_without_pieces_and_a_wearer_without_boxes_are_compared():
         accelerations=np.zeros((1, 4)),
     )
     comparison = checker_comparison.compare_checkers(
-        table_1_arm(), Scene(()), QUESTION.goal, still, MARGIN, RAY
+        QUESTION.required, Scene(()), QUESTION.goal, still
     )
     assert comparison.is_proven
     assert comparison.clearance == np.inf

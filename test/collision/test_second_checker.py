@@ -13,6 +13,7 @@ from rrth_planner.collision.bar_pairs import pair_names, pairs_of
 from rrth_planner.collision.distance_library import LIBRARIES, library_of
 from rrth_planner.collision.world import arm_world
 from rrth_planner.model.arm import bars_of, mount_bars, tool_pose
+from rrth_planner.model.required_clearance import RequiredClearance
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import sample, Trajectory
 from worlds import (
@@ -34,10 +35,16 @@ from worlds import (
 def checker(request):
     """Give the functions of the second checker by each library."""
     pytest.importorskip(request.param)
+    required = partial(RequiredClearance, library=request.param)
+
+    def nearest(arm, scene, q, ray):
+        return second_checker.nearest(required(arm, 0.0, ray), scene, q)
+
+    def first_violation(arm, scene, trajectory, margin, ray, reach):
+        return second_checker.first_violation(required(arm, margin, ray), scene, trajectory, reach)
+
     return SimpleNamespace(
-        nearest=partial(second_checker.nearest, library=request.param),
-        first_violation=partial(second_checker.first_violation, library=request.param),
-        library=library_of(request.param),
+        nearest=nearest, first_violation=first_violation, library=library_of(request.param)
     )
 
 

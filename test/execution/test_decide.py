@@ -16,7 +16,7 @@ from decisions import (
     idle,
     moment,
     on,
-    Rules,
+    RULES,
     turn,
 )
 import numpy as np
@@ -111,7 +111,7 @@ def happening(name, state):
                 'Begin': lambda at=at, watch=watch: (
                     replace(monitoring()[1], start_time=at.now, trajectory=MOTION),
                     GOAL,
-                    Rules(),
+                    RULES,
                     *(None, None, watch.n_stops, watch.n_faults),
                 ),
                 'BodyCame': lambda at=at: (body(at).sight, body(at).look),
@@ -254,7 +254,7 @@ def test_what_was_planned_before_a_stop_or_a_fault_does_not_begin_after_it(count
     watch, motion = monitoring()
     stops, faults = watch.n_stops - counts[0], watch.n_faults - counts[1]
     planned = replace(motion, start_time=WITHIN)
-    begin = events.Begin(on(motion, WITHIN), planned, GOAL, Rules(), None, None, stops, faults)
+    begin = events.Begin(on(motion, WITHIN), planned, GOAL, RULES, None, None, stops, faults)
     with pytest.raises(RequestError, match=sentence) as caught:
         decide(watch, begin)
     assert caught.value.code is code
@@ -265,6 +265,6 @@ def test_no_motion_begins_while_a_stop_is_to_be_published():
     at = on(motion, WITHIN)
     kept = decide(watch, events.Fail(at, 'of the test', True, False)).otherwise.watch
     planned = replace(motion, start_time=WITHIN)
-    begin = events.Begin(at, planned, GOAL, Rules(), None, None, kept.n_stops, kept.n_faults)
+    begin = events.Begin(at, planned, GOAL, RULES, None, None, kept.n_stops, kept.n_faults)
     with pytest.raises(RequestError, match='could not be published: of the test'):
         decide(kept, begin)

@@ -10,6 +10,7 @@ from rrth_planner.collision.reference_checker import first_contact, frames
 from rrth_planner.execution import expected_wearer
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.expected_wearer import AHEAD, expected_scene, is_expected_free, SLOW
+from rrth_planner.model.required_clearance import RequiredClearance
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import sample
 from worlds import examples, MARGIN, random_boxes, random_motion, RAY, table_1_arm
@@ -64,7 +65,7 @@ def test_a_wearer_of_as_many_boxes_as_there_may_be_is_expected_at_fewer_times(mo
 
 
 def free_of(running, phase, expected):
-    return is_expected_free(running, phase, ARM, expected, margin=MARGIN, ray_guard_length=RAY)
+    return is_expected_free(running, phase, RequiredClearance(ARM, MARGIN, RAY), expected)
 
 
 def test_the_next_stretch_is_free_as_the_reference_checker_has_it():

@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Events in any order: what holds of the monitor's memory, and of its commands, after each."""
 
-from decisions import ARM, BEGIN, FAR, GOAL, hand, idle, Rules, turn
+from dataclasses import replace
+
+from decisions import ARM, BEGIN, FAR, GOAL, hand, idle, RULES as AT_ONCE, turn
 from hypothesis import settings, strategies as st
 from hypothesis.stateful import initialize, invariant, rule, RuleBasedStateMachine
 import numpy as np
@@ -29,9 +31,9 @@ SEPARATION = Separation(
     stop_limits=worlds.limits(),
 )
 RULES = [
-    Rules(execution=ExecutionRules(None, DELAY, False)),
-    Rules(execution=ExecutionRules(SEPARATION, DELAY, False)),
-    Rules(execution=ExecutionRules(SEPARATION, DELAY, True)),
+    replace(AT_ONCE, execution=ExecutionRules(None, DELAY, False)),
+    replace(AT_ONCE, execution=ExecutionRules(SEPARATION, DELAY, False)),
+    replace(AT_ONCE, execution=ExecutionRules(SEPARATION, DELAY, True)),
 ]
 MOTION = turn()
 STALE = 'the body is 1.000 s old'

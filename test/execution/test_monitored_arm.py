@@ -7,6 +7,7 @@ import pytest
 from rrth_planner.collision.reference_checker import bars, first_contact
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.monitored_arm import arm_at_rest, monitored, retargeted, started
+from rrth_planner.model.required_clearance import RequiredClearance
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import positions_at
 from worlds import limits, MARGIN, random_motion, RAY, table_1_arm, wearer
@@ -30,7 +31,7 @@ def motion():
 def resting(motion):
     """Return an arm at the beginning of a motion, without a target."""
     q = motion.trajectory.positions[0]
-    return arm_at_rest(ARM, q, limits(), margin=MARGIN, ray_guard_length=RAY)
+    return arm_at_rest(RequiredClearance(ARM, MARGIN, RAY), q, limits())
 
 
 def with_box_at(place):

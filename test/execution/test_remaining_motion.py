@@ -16,6 +16,7 @@ from rrth_planner.execution.remaining_motion import (
     is_place_free,
     is_remaining_free,
 )
+from rrth_planner.model.required_clearance import RequiredClearance
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import (
     part_of,
@@ -37,6 +38,7 @@ from worlds import (
 )
 
 SEEDS = st.integers(0, 2**32 - 1)
+REQUIRED = RequiredClearance(table_1_arm(), MARGIN, RAY)
 
 
 def off_the_path(trajectory, q):
@@ -89,7 +91,7 @@ def test_the_remaining_motion_is_free_where_the_certificate_says_so(seed, n_more
     world = arm_world(arm, scene, MARGIN, RAY)
     is_proven = certify(motion, world, max(phase, 0.0)).is_proven
     running = ExecutingMotion(trajectory=motion, start_time=0.0, target_distance=reach)
-    is_free = is_remaining_free(running, phase, arm, scene, margin=MARGIN, ray_guard_length=RAY)
+    is_free = is_remaining_free(running, phase, REQUIRED, scene)
     assert is_free == (is_proven and world.is_valid(motion.positions[-1], max(reach, RAY)))
 
 
@@ -109,10 +111,8 @@ def test_what_is_called_free_is_free_of_a_body_that_moved(seed):
     is_free = is_remaining_free(
         ExecutingMotion(trajectory=motion, start_time=0.0),
         phase,
-        arm,
+        REQUIRED,
         scene,
-        margin=MARGIN,
-        ray_guard_length=RAY,
     )
     rest = part_of(motion, phase, motion.duration)
     is_violated = any(
@@ -195,12 +195,8 @@ def test_a_motion_that_escapes_is_distinguished_from_one_that_does_not():
         if scene is None:
             continue
         running = ExecutingMotion(trajectory=motion, start_time=0.0)
-        assert not is_remaining_free(
-            running, phase, arm, scene, margin=MARGIN, ray_guard_length=RAY
-        )
-        found = escapes_by_continuing(
-            running, phase, arm, scene, margin=MARGIN, ray_guard_length=RAY
-        )
+        assert not is_remaining_free(running, phase, REQUIRED, scene)
+        found = escapes_by_continuing(running, phase, REQUIRED, scene)
         counts[found] += 1
         hand = scene.boxes[-1]
         if found:
@@ -208,9 +204,7 @@ def test_a_motion_that_escapes_is_distinguished_from_one_that_does_not():
             assert not meets(arm, hand, q, growth_to(arm, hand, q[0]) - 1e-5).any()
             end = reference_checker.least_clearance(arm, Scene((hand,)), q[-1:], RAY)
             assert end >= MARGIN - 1e-6
-        assert not escapes_by_continuing(
-            running, phase, arm, wearer(), margin=MARGIN, ray_guard_length=RAY
-        )
+        assert not escapes_by_continuing(running, phase, REQUIRED, wearer())
     assert min(counts.values()) >= 5, counts
 
 
@@ -219,7 +213,7 @@ def test_a_place_is_free_by_the_boxes_of_a_moment_as_by_the_world():
     low, high = arm.bounds
     for _ in range(300):
         q, ray = rng.uniform(low, high), rng.uniform(0.0, 1.0)
-        found = is_place_free(q, arm, wearer(), MARGIN, ray)
+        found = is_place_free(q, RequiredClearance(arm, MARGIN, ray), wearer())
         assert found == arm_world(arm, wearer(), MARGIN, ray).is_valid(q)
         counts[found] += 1
     assert min(counts.values()) >= 20, counts

@@ -10,6 +10,7 @@ from rrth_planner.execution import warm_up as module
 from rrth_planner.execution.commitment import Commitment
 from rrth_planner.execution.warm_up import warm_up
 from rrth_planner.io.arm_file import load_arm
+from rrth_planner.model.required_clearance import RequiredClearance
 from rrth_planner.model.separation import Separation, SeparationRules
 from worlds import limits
 
@@ -31,7 +32,7 @@ def test_a_motion_is_monitored_in_each_way_that_there_is(monkeypatch, file, is_s
     separation = Separation(
         arm=arm, rules=SeparationRules(), margin=0.02, limits=rates, stop_limits=rates
     )
-    warm_up(arm, rates, 0.02, 1.0, separation if is_separated else None)
+    warm_up(RequiredClearance(arm, 0.02, 1.0), rates, separation if is_separated else None)
     assert {name for name, _ in found[:3]} == {
         'is_remaining_free',
         'escapes_by_continuing',

@@ -28,6 +28,7 @@ from rrth_planner.execution.remaining_motion import escapes_by_continuing, is_re
 from rrth_planner.model.arm import bar_ends
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.path import Path
+from rrth_planner.model.required_clearance import RequiredClearance  # noqa: E402
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import MotionState, positions_at, sample, StartState
@@ -610,7 +611,7 @@ def test_a_target_in_the_wearer_is_rejected_wherever_the_arm_is():
 def second_opinion(arm, scene, world, trajectory):
     depths = escape_depths(world, trajectory.positions[0])
     return second_checker.first_escape_violation(
-        arm, scene, depths, trajectory, trajectory.duration, MARGIN, RAY
+        RequiredClearance(arm, MARGIN, RAY), scene, depths, trajectory, trajectory.duration
     )
 
 
@@ -665,15 +666,15 @@ def test_a_running_escape_is_free_until_the_wearer_comes_nearer():
         target_distance=plan.target_distance,
         escape_time=plan.escape_time,
     )
-    kept = {'margin': MARGIN, 'ray_guard_length': RAY}
+    required = RequiredClearance(arm, MARGIN, RAY)
     for phase in np.linspace(0.0, plan.trajectory.duration, 12):
-        assert is_remaining_free(running, phase, arm, scene, **kept)
-    assert not is_remaining_free(replace(running, escape_time=0.0), 0.0, arm, scene, **kept)
+        assert is_remaining_free(running, phase, required, scene)
+    assert not is_remaining_free(replace(running, escape_time=0.0), 0.0, required, scene)
     # The hand follows the arm further than it goes.
     hand = scene.boxes[-1]
     near = replace(hand, center=hand.center + 0.04 * hand.rotation[:, 1])
     followed = Scene((*scene.boxes[:-1], near))
-    assert not is_remaining_free(running, 0.5 * plan.escape_time, arm, followed, **kept)
+    assert not is_remaining_free(running, 0.5 * plan.escape_time, required, followed)
 
 
 @examples(15)
@@ -690,14 +691,14 @@ def test_an_escape_goes_on_where_the_wearer_moves_in_the_ray(seed):
         target_distance=plan.target_distance,
         escape_time=plan.escape_time,
     )
-    kept = {'margin': MARGIN, 'ray_guard_length': RAY}
+    required = RequiredClearance(arm, MARGIN, RAY)
     for _ in range(6):
         phase, moved = rng.uniform(0.0, plan.escape_time), rng.normal(size=3)
         box = scene.boxes[-1]
         box = replace(box, center=box.center + 0.01 * moved / np.linalg.norm(moved))
         now = Scene((*scene.boxes[:-1], box))
-        is_free = is_remaining_free(running, phase, arm, now, **kept)
-        goes_on = is_free or escapes_by_continuing(running, phase, arm, now, **kept)
+        is_free = is_remaining_free(running, phase, required, now)
+        goes_on = is_free or escapes_by_continuing(running, phase, required, now)
         n_moved[goes_on] += 1
         n_moved['without proof'] += not is_free
         if not goes_on:
@@ -725,7 +726,7 @@ def test_a_hand_that_comes_into_the_way_of_a_bar_is_no_reason_to_go_on():
     running = ExecutingMotion(
         trajectory=plan.trajectory, start_time=0.0, escape_time=plan.escape_time
     )
-    kept = {'margin': MARGIN, 'ray_guard_length': RAY}
+    required = RequiredClearance(arm, MARGIN, RAY)
     later = positions_at(plan.trajectory, [0.7 * plan.trajectory.duration])
     for bar, size, goes_on in ((0, 0.02, False), (-1, 1e-3, True)):
         ends = oracle_bars(arm, later, RAY)[0, bar]
@@ -734,8 +735,8 @@ def test_a_hand_that_comes_into_the_way_of_a_bar_is_no_reason_to_go_on():
             # In the ray now, instead of later.
             box = replace(box, center=oracle_bars(arm, FOLDED[None], RAY)[0, -1].mean(axis=0))
         now = Scene((*scene.boxes, box))
-        assert not is_remaining_free(replace(running, escape_time=0.0), 0.0, arm, now, **kept)
-        assert escapes_by_continuing(running, 0.0, arm, now, **kept) == goes_on
+        assert not is_remaining_free(replace(running, escape_time=0.0), 0.0, required, now)
+        assert escapes_by_continuing(running, 0.0, required, now) == goes_on
 
 
 def test_an_empty_world_has_no_depth():

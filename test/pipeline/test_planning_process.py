@@ -100,7 +100,7 @@ def test_the_second_checker_sees_what_it_sees_here(process):
         'hand', tool_pose(worlds.table_1_arm(), tool)[:3, 3], np.full(3, 0.05), np.eye(3)
     )
     for scene in (asked.scene, Scene((*asked.scene.boxes, in_the_way))):
-        arguments = (asked.arm, scene, motion, asked.margin, asked.ray_guard_length, 1.0)
+        arguments = (asked.required, scene, motion, 1.0)
         found = process.violation_seen(*arguments)
         assert found == in_process.InProcessPlanner.violation_seen(*arguments)
     assert found.box == 'hand'
@@ -138,13 +138,13 @@ def test_one_that_hangs_is_replaced_once_its_request_is_cancelled(process, said,
 def test_one_that_hangs_over_a_question_is_replaced_after_its_time_limit(process, said):
     assert process.plan(question()).status is PlanStatus.SOLVED
     asked = question(options=RRTHOptions(time_limit=0.1))
-    motion, arm = process.plan(question()).trajectory, worlds.table_1_arm()
+    motion, required = process.plan(question()).trajectory, asked.required
     # More than a pipe holds.
     huge = Scene(tuple(Box(f'{k}', [9.0, 9.0, k], np.ones(3), np.eye(3)) for k in range(5000)))
     for ask in (
         lambda: process.plan(asked),
         lambda: process.plan(dataclasses.replace(asked, scene=huge)),
-        lambda: process.violation_seen(arm, worlds.wearer(), motion, 0.02, 1.0, 1.0),
+        lambda: process.violation_seen(required, worlds.wearer(), motion, 1.0),
     ):
         before, n_said = process.pid, len(said)
         os.kill(before, signal.SIGSTOP)
@@ -298,7 +298,7 @@ def test_ctrl_c_does_not_end_it(process):
 
 def test_an_error_is_raised_here_with_where_it_was_raised_there(process):
     with pytest.raises(AttributeError) as caught:
-        process.violation_seen(None, None, None, 0.0, 0.0, 0.0)
+        process.violation_seen(question().required, None, None, 0.0)
     assert isinstance(caught.value.__cause__, PlanningTraceback)
     assert 'trajectory_validation' in str(caught.value.__cause__)
     assert process.plan(question()).status is PlanStatus.SOLVED

@@ -18,6 +18,7 @@ from rrth_planner.io.settings import load_settings  # noqa: E402
 from rrth_planner.io.wearer_file import load_body  # noqa: E402
 from rrth_planner.model.arm import ArmModel, pointing_error, tool_pose  # noqa: E402
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
+from rrth_planner.model.required_clearance import RequiredClearance  # noqa: E402
 from rrth_planner.model.scene import Box, Scene  # noqa: E402
 from rrth_planner.model.status import PlanStatus  # noqa: E402
 from rrth_planner.model.trajectory import MotionState, sample, StartState  # noqa: E402
@@ -147,7 +148,8 @@ def assert_good(arm, scene, plan, q_start, target):
     world = arm_world(arm, scene, MARGIN, RAY)
     assert certify(motion, world, plan.escape_time).is_proven
     reach = float(np.linalg.norm(target - tool_pose(arm, motion.positions[-1])[:3, 3]))
-    assert violation_seen(arm, scene, motion, MARGIN, RAY, reach, plan.escape_time, 'fcl') is None
+    required = RequiredClearance(arm, MARGIN, RAY)
+    assert violation_seen(required, scene, motion, reach, plan.escape_time) is None
     if plan.escape_time == 0.0:
         limits = load_settings(arm.dof).limits
         inspect_motion(

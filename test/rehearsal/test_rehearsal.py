@@ -20,6 +20,7 @@ from rrth_planner.io.resources import resource_path
 from rrth_planner.io.settings import load_settings
 from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.errors import OptionsError
+from rrth_planner.model.required_clearance import RequiredClearance
 from rrth_planner.model.scene import Box
 from rrth_planner.model.separation import Separation, SeparationRules
 from rrth_planner.pipeline.planning_process import PlanningProcessError
@@ -156,9 +157,7 @@ def test_the_witness_sees_contacts_that_nobody_else_sees():
         arm=arm, rules=SeparationRules(), margin=0.02, limits=limits, stop_limits=limits
     )
     rules = PlainRules(
-        arm=arm,
-        margin=0.02,
-        ray_guard_length=1.0,
+        required=RequiredClearance(arm, 0.02, 1.0),
         stop_limits=limits,
         execution=ExecutionRules(separation, 0.01, False),
     )

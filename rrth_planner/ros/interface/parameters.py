@@ -20,11 +20,13 @@ from rrth_planner.io.settings import (
     HIGHEST_LIMIT,
     LOWEST_LIMIT,
     PlanSettings,
+    required_clearance,
     settings_from_values,
 )
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import frozen_array
 from rrth_planner.model.errors import ModelError, OptionsError, RrthError, shown
+from rrth_planner.model.required_clearance import RequiredClearance
 from rrth_planner.model.separation import BODY_SPEEDS, Separation, SeparationRules
 from rrth_planner.model.trajectory import MotionLimits, REST_SPEED
 from rrth_planner.planning.options import ALGORITHMS
@@ -182,6 +184,11 @@ class PlannerParameters(PlanSettings):
     incident_folder: str
     rest_speed: float
     start_tolerance: float
+
+    @property
+    def required(self) -> RequiredClearance:
+        """What stays clear of the wearer."""
+        return required_clearance(self.arm, self)
 
     @property
     def stands_still(self) -> bool:

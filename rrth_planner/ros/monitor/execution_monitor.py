@@ -415,8 +415,7 @@ class ExecutionMonitor:
             q = self._inputs.joints_at(now, parameters.joint_timeout).positions
         except RequestError:
             return False
-        length = parameters.ray_guard_length
-        return is_ray_clear(q, parameters.arm, scene_of(body), parameters.margin, length)
+        return is_ray_clear(q, parameters.required, scene_of(body))
 
     def _elapsed(self, arrived: int) -> float:
         """Return the time since the arrival of a body [ns -> s]."""

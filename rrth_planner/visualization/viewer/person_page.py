@@ -48,13 +48,7 @@ class PersonPage:
         self._person, self._skeleton = person, skeleton
         self._scene = question.scene
         self._margin, self._arm = question.margin, question.arm
-        self._state = arm_at_rest(
-            question.arm,
-            question.q_start,
-            question.limits,
-            margin=question.margin,
-            ray_guard_length=question.ray_guard_length,
-        )
+        self._state = arm_at_rest(question.required, question.q_start, question.limits)
         self._lock = Lock()
         # Written by the callbacks of the page.
         self._aimed: Array | None = None
