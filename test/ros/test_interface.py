@@ -464,8 +464,21 @@ def test_a_plan_keeps_to_the_parameters_of_its_begin(start, monkeypatch):
     # They monitor the motion, too.
     for seed, margin in ((5, 0.02), (6, 0.03)):
         assert stranger.answer().message.split('; ')[0].endswith(f'seed {seed}')
-        assert planner._monitor.watch.rules.margin == margin
+        assert planner._monitor.watch.rules.required.margin == margin
     assert jerks == [40.0, 30.0]
+
+
+def test_a_speed_of_rest_holds_from_the_next_joint_state_on(start, wait_until):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    slow, came = joints(velocity=[0.05, 0.0, 0.0, 0.0]), inputs_of(planner).joints
+    for rest_speed, is_moving in ((0.01, True), (0.1, False), (0.04, True)):
+        planner.set_parameters([Parameter('rest_speed', value=rest_speed)])
+        before = came.value
+        stranger.publishers['joint_states'].publish(slow)
+        wait_until(lambda before=before: came.value is not before)
+        assert came.value.is_moving(came.value.taken) == is_moving
+        assert came.value.rests_after(came.value.received) != is_moving
 
 
 @pytest.mark.parametrize('profile', [LATCHED, VOLATILE])
