@@ -87,7 +87,7 @@ class PlanPublishers:
     ) -> JointTrajectory:
         """Return the message of such a motion."""
         return joint_trajectory_to_msg(
-            trajectory, parameters.arm.joint_names, self._base_frame, begin
+            trajectory, parameters.required.arm.joint_names, self._base_frame, begin
         )
 
     def prepared(
@@ -137,7 +137,9 @@ class PlanPublishers:
 
     def tool_path(self, trajectory: Trajectory, parameters: MonitorRules) -> Path:
         """Return the tool's path along a motion."""
-        return tool_path_to_msg(parameters.arm, trajectory, self._base_frame, TOOL_PATH_POSES)
+        return tool_path_to_msg(
+            parameters.required.arm, trajectory, self._base_frame, TOOL_PATH_POSES
+        )
 
     def is_view_subscribed(self) -> bool:
         """Return whether `publish_view` has any subscriber."""
@@ -150,5 +152,12 @@ class PlanPublishers:
         path = self.tool_path(trajectory, parameters)
         self._tool_path.publish(path)
         self._markers.publish(
-            plan_markers(parameters.arm, scene, parameters.margin, trajectory, target, path)
+            plan_markers(
+                parameters.required.arm,
+                scene,
+                parameters.required.margin,
+                trajectory,
+                target,
+                path,
+            )
         )
