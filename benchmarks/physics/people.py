@@ -14,6 +14,7 @@ from functools import cache
 import math
 
 import numpy as np
+from rrth_planner.execution.joint_reading import JointReading, with_earlier
 from rrth_planner.io.motion_capture_file import load_person
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.trajectory import Trajectory
@@ -61,6 +62,15 @@ class PhysicalController(Controller):
             self.letters.pop()
         self.letters.append((came, trajectory, begin))
 
+    def measured(self, time: float, lag: float, before: JointReading | None) -> JointReading:
+        """Return what the encoders of the arm have at a time [s], however late that is."""
+        assert self.arm is not None
+        state = self.arm.reading
+        q, taken = state.positions, state.time
+        return JointReading(
+            q, state.velocities, taken, time, math.inf, with_earlier(q, taken, before)
+        )
+
     def advance(self, time: float) -> None:
         """Let the arm go on to a time [s]."""
         arm = self.arm
@@ -95,9 +105,9 @@ class PhysicalSession(Session):
         # By how much the ray missed the targets that were reached [m].
         self.misses: list[float] = []
 
-    def _with_separation(self, time: float) -> None:
+    def _go_on(self, time: float) -> None:
         self.physical.advance(time)
-        super()._with_separation(time)
+        super()._go_on(time)
 
     def _next(self, outcome: str, time: float) -> None:
         if outcome == REACHED and self.target is not None:

@@ -3,9 +3,8 @@
 """
 Section `servos`: motions round a wearer at rest, executed by servos that lag; half are stopped.
 
-Each motion is planned with the margin of the package. What the monitor of the node makes of the
-arm's joint states is found by its own code: where the arm is on its motion, and whether it ignores
-a stop.
+Each motion is planned with the margin of the package. The monitor of the node commands it beside
+the wearer, and says where the arm is on it, and whether the arm ignores a stop.
 """
 
 from collections.abc import Sequence
@@ -13,24 +12,22 @@ from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
+from rrth_planner.execution.commitments import ExecutionRules
+from rrth_planner.execution.decision import Command
+from rrth_planner.execution.event import Begin, BodyCame, Look, Moment, Tick
 from rrth_planner.execution.executing_motion import ExecutingMotion
-from rrth_planner.execution.joint_reading import JointReading
-from rrth_planner.execution.tracked_motion import (
-    missed_stop,
-    track,
-    track_stop,
-    tracked_phase,
-    TrackedMotion,
-)
+from rrth_planner.execution.joint_reading import JointReading, with_earlier
+from rrth_planner.execution.monitor import Monitor
+from rrth_planner.execution.tracked_motion import tracked_phase
+from rrth_planner.execution.watch import PlainRules
 from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.arm import forward_kinematics
-from rrth_planner.model.arrays import Array
+from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
-from rrth_planner.model.trajectory import Trajectory
+from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.simulation.body_shapes import whole_box
 from rrth_planner.simulation.moving_body import standing_body
 from rrth_planner.simulation.simulated_arm import ArmReading, SimulatedArm, STEP_PERIOD
-from rrth_planner.timing.fast_stop import fast_stop
 
 from benchmarks.common.random_draws import random_wearer
 from benchmarks.physics.setting import (
@@ -42,14 +39,24 @@ from benchmarks.physics.setting import (
     points_of,
     Setup,
 )
-from benchmarks.separation.setting import FOLDED, MARGIN, random_plans, the_arm, the_settings
+from benchmarks.separation.setting import (
+    FOLDED,
+    MARGIN,
+    random_plans,
+    required,
+    the_arm,
+    the_settings,
+)
 
 # Motions of a chain, the first of which begins folded.
 CHAIN = 10
 # The arm comes to rest under its weight before a motion, and after it [s].
 SETTLING = 0.5
-# Joint states come every so many steps; a motion begins so long after it is sent [s].
-STEPS, AHEAD = 5, 0.01
+# Joint states come every so many steps, and bodies with every so many of them; a motion begins so
+# long after it is sent [s].
+STEPS, BODIES, AHEAD = 5, 4, 0.01
+# No decision needs what the arm aims at.
+GOAL, NOWHERE = PointingGoal(np.ones(3)), Scene(())
 # Below this the arm hardly moves, and nothing is said of its lag [rad/s].
 SLOW = 0.3
 
@@ -76,7 +83,9 @@ class Judged:
     n_states, n_suspended : int
         Joint states, and those by which the monitor does not find the arm on its motion.
     n_alarms : int
-        Stops that the monitor takes to be ignored.
+        Times that the monitor takes a stop to be ignored, and sends it again.
+    n_other : int
+        Motions that it stops or gives up by itself.
 
     """
 
@@ -92,6 +101,7 @@ class Judged:
     n_states: int = 0
     n_suspended: int = 0
     n_alarms: int = 0
+    n_other: int = 0
 
 
 def setup_of(seed: int) -> Setup:
@@ -112,7 +122,7 @@ def chain_of_motions(n: int, seed: int) -> Judged:
             continue
         assert plan.trajectory is not None
         share = rng.random() if k % 2 else None
-        _Execution(judged, scene, plan.trajectory, int(rng.integers(2**31))).run(share)
+        _Execution(judged, scene, plan, int(rng.integers(2**31))).run(share)
         q = plan.trajectory.positions[-1]
     return judged
 
@@ -120,26 +130,33 @@ def chain_of_motions(n: int, seed: int) -> Judged:
 class _Execution:
     """A motion of a simulated arm, and the node's monitor of it."""
 
-    def __init__(self, judged: Judged, scene: Scene, motion: Trajectory, seed: int) -> None:
+    def __init__(self, judged: Judged, scene: Scene, plan: MotionPlan, seed: int) -> None:
         """Let the arm settle where the motion begins, and begin it."""
-        body = standing_body(scene)
-        self.judged, self.motion = judged, motion
+        assert plan.trajectory is not None
+        self.judged, self.motion, self.scene = judged, plan.trajectory, scene
         self.arm: SimulatedArm = arm_of(
-            judged.setup, motion.positions[0], body, seed, fill=whole_box
+            judged.setup, self.motion.positions[0], standing_body(scene), seed, fill=whole_box
         )
         self.clearance = clearance_of(self.arm.physics)
         # Of the commanded curve.
         self.ghost = mujoco.MjData(self.arm.physics.model)
         self.reading: JointReading | None = None
-        self.tracked = TrackedMotion()
+        self.rules = PlainRules(
+            required=required(),
+            stop_limits=the_settings().limits,
+            execution=ExecutionRules(None, judged.setup.delay, is_manual=False),
+        )
+        self.monitor = Monitor(self.rules, self._moment, self._look, self._send)
+        self.n_states = 0
         self.least = self.least_commanded = np.inf
-        self.efforts: list[tuple[Array, Array]] = []
         self._advance(SETTLING)
-        begin = self.arm.time + AHEAD
-        executing = ExecutingMotion(trajectory=motion, start_time=begin)
-        self.tracked = track(self.tracked, executing, self.reading, self.arm.time)
-        self.arm.execute(points_of(motion), begin)
-        self.begin, self.is_stopped = begin, False
+        whole = ExecutingMotion(
+            trajectory=self.motion,
+            start_time=self.arm.time + AHEAD,
+            target_distance=plan.target_distance,
+        )
+        self._read(self.arm.reading)
+        self.monitor.begin(Begin(self._moment(), whole, GOAL, self.rules, np.inf, None, 0, 0))
 
     def run(self, share: float | None) -> None:
         """Execute the motion, to its end or to a share of it, where it is stopped."""
@@ -147,6 +164,7 @@ class _Execution:
         judged.n_motions += 1
         end = AHEAD + (1.0 if share is None else share) * motion.duration
         self._watch(end)
+        judged.n_other += self.monitor.watch.n_stops
         if share is None:
             self._watch(SETTLING)
         else:
@@ -158,16 +176,17 @@ class _Execution:
 
     def _stop(self) -> None:
         """Stop the arm as the node does, and see whether it is taken to ignore that."""
-        time = self.arm.time
-        phase = tracked_phase(self.tracked, self.reading, time)
-        if phase is None or not 0.0 < phase < self.motion.duration:
+        before = self.monitor.watch
+        if not before.is_monitoring:
+            return
+        self.monitor.fail('of the benchmark', is_replanned=False, is_fault=False)
+        if self.monitor.watch.n_stops == before.n_stops:
             return
         self.judged.n_stops += 1
-        stop = fast_stop(self.motion, phase, the_settings().limits)
-        self.tracked = track_stop(self.tracked, ExecutingMotion(trajectory=stop, start_time=time))
-        self.arm.execute(points_of(stop), time)
-        self.is_stopped = True
-        self._watch(stop.duration + SETTLING)
+        n_commands, running = self.monitor.n_commands, self.monitor.watch.running
+        assert running is not None
+        self._watch(running.trajectory.duration + SETTLING)
+        self.judged.n_alarms += self.monitor.n_commands - n_commands
 
     def _advance(self, seconds: float) -> None:
         for _ in range(round(seconds / STEP_PERIOD)):
@@ -200,14 +219,32 @@ class _Execution:
 
     def _locate(self, state: ArmReading) -> None:
         """Have the monitor find the arm on its motion, or on its stop."""
+        self._read(state)
+        self.monitor.take(Tick(self._moment()))
+        self.n_states += 1
+        if self.n_states % BODIES == 0:
+            self.monitor.take(BodyCame(self._moment(), None, self._look()))
+        watch = self.monitor.watch
+        if watch.running is not None:
+            self.judged.n_states += 1
+            phase = tracked_phase(watch.tracked, self.reading, state.time)
+            self.judged.n_suspended += phase is None
+
+    def _read(self, state: ArmReading) -> None:
+        recent = with_earlier(state.positions, state.time, self.reading)
         self.reading = JointReading(
-            state.positions, state.velocities, state.time, state.time, np.inf
+            state.positions, state.velocities, state.time, state.time, np.inf, recent
         )
-        self.judged.n_states += 1
-        self.judged.n_suspended += tracked_phase(self.tracked, self.reading, state.time) is None
-        if self.is_stopped:
-            self.tracked, missed = missed_stop(self.tracked, self.reading, state.time)
-            self.judged.n_alarms += missed is not None
+
+    def _moment(self) -> Moment:
+        now = self.arm.time
+        return Moment(now=now, steady=now, reading=self.reading, rules=self.rules)
+
+    def _look(self) -> Look:
+        return Look(self.scene, NOWHERE, 0.0)
+
+    def _send(self, command: Command) -> None:
+        self.arm.execute(points_of(command.motion.trajectory), command.begin)
 
 
 HEADER = (

@@ -14,7 +14,6 @@ import numpy as np
 from rrth_planner.collision.reference_checker import bar_ends_at
 from rrth_planner.execution.commitment import path_state
 from rrth_planner.execution.executing_motion import ExecutingMotion
-from rrth_planner.execution.monitored_arm import arm_at_rest, monitored, MonitoredArm, started
 from rrth_planner.execution.remaining_motion import is_remaining_free
 from rrth_planner.io.wearer_file import load_body
 from rrth_planner.kernels.layout import SIZE
@@ -41,7 +40,6 @@ from benchmarks.separation.lockstep import (
     instants,
     PATIENCE,
     Planner,
-    scene_of_rows,
     Timing,
 )
 from benchmarks.separation.reaching import (
@@ -60,7 +58,6 @@ from benchmarks.separation.setting import (
     required,
     separation_of,
     the_arm,
-    the_settings,
 )
 
 # A further hand is such a cube, at a distance from the way of the arm from the first to the second
@@ -267,7 +264,9 @@ class _Episode:
         self.motion = plan.trajectory
         self.settings = separation_of(trial.case)
         self.controller = Controller(q)
-        self.planner = Planner(self.settings, trial.timing, rng, self.controller)
+        self.planner = Planner(
+            self.settings, trial.timing, rng, self.controller, is_separate=trial.is_separate
+        )
         self.eyes = trial.eyes(wearer.names, wearer.scene.numbers, rng)
         self.share = rng.uniform(0.0, 0.95)
         self.is_right_after = bool(rng.random() < RIGHT_AFTER)
@@ -275,12 +274,11 @@ class _Episode:
         self.aims_again, self.looks_at_plan = (bool(rng.random() < 0.5) for _ in range(2))
         self.leaves, self.was_moving = np.inf, False
         self.gone_from = np.inf
-        self.monitored: MonitoredArm | None = None
 
     def run(self) -> bool:
         """Run it until a while after the part has left; return whether the motion began."""
         timing, faults, planner = self.trial.timing, self.trial.faults, self.planner
-        planner.begin(self.motion, 0.0)
+        planner.begin(self.plan)
         k = 0
         while (time := k * timing.period) < PATIENCE:
             k += 1
@@ -293,13 +291,16 @@ class _Episode:
             self._aim(time)
             if self.rng.random() >= faults.lost or k == 1:
                 self._see(time)
-                self._command(time)
+                planner.frame(time, self.eyes)
         return False
 
     def _choose(self, time: float) -> None:
         """Have the part leave between this frame and the next where the arm is there by then."""
         period = self.trial.timing.period
-        if self._progress(time + period) < self.share * self.motion.duration and time < LATEST:
+        if (
+            self.planner.progress(time + period) < self.share * self.motion.duration
+            and time < LATEST
+        ):
             return
         if self.gone_from == np.inf and self.trial.faults.gone > 0.0:
             self.gone_from = time + self.rng.uniform(0.0, 0.1)
@@ -312,11 +313,6 @@ class _Episode:
             self.leaves = time + (-self.trial.timing.age) % period + 1e-6
         else:
             self.leaves = time + self.rng.uniform(0.0, period)
-
-    def _progress(self, time: float) -> float:
-        if self.trial.is_separate:
-            return self.planner.progress(time)
-        return time
 
     def _aim(self, time: float) -> None:
         """Have the part leave, or, where it aims again, turn to where the arm is going to be."""
@@ -356,8 +352,11 @@ class _Episode:
         """Return what the part expects of the arm: what it was given, or that it goes on."""
         if not self.looks_at_plan or not self.trial.is_separate or not self.planner.is_under_way:
             return self._states(time + ahead)
+        state = _path_state(self.planner, time - self.trial.timing.lag)
+        if state is None:
+            return self._states(time + ahead)
         # It goes on at the present rate.
-        tau, rate, _ = _path_state(self.planner, time - self.trial.timing.lag)
+        tau, rate, _ = state
         places = np.minimum(tau + rate * ahead, self.motion.duration)
         q = positions_at(self.motion, places)
         return q, np.gradient(q, STEP, axis=0)
@@ -374,30 +373,6 @@ class _Episode:
         seen = np.ones(len(rows), dtype=bool)
         seen[wearer.part] = not self.gone_from <= shown < self.gone_from + faults.gone
         self.eyes.see(rows, time - timing.age, seen)
-
-    def _command(self, time: float) -> None:
-        """Have the arm commanded by what is seen now."""
-        timing = self.trial.timing
-        if self.trial.is_separate:
-            self.planner.frame(time, self.eyes)
-            return
-        at = time + timing.thinking + self.rng.uniform(*timing.latency)
-        scene = scene_of_rows(self.wearer.names, self.eyes.rows)
-        if self.monitored is None:
-            settings = the_settings()
-            still = arm_at_rest(required(), self.controller.place, settings.limits)
-            whole = ExecutingMotion(
-                trajectory=self.motion,
-                start_time=at,
-                target_distance=self.plan.target_distance,
-            )
-            self.monitored = started(still, whole, scene, at)
-        else:
-            self.monitored = monitored(self.monitored, scene, at)
-        playback = self.monitored.playback
-        trajectories = self.controller.trajectories
-        if not trajectories or trajectories[-1] is not playback.trajectory:
-            self.controller.give(playback.trajectory, playback.start_time, at)
 
     def _states(self, times: Array) -> tuple[Array, Array]:
         return self.controller.states(times - self.trial.timing.lag)
@@ -432,12 +407,14 @@ class _Episode:
         return self.planner.place()
 
 
-def _path_state(planner: Planner, time: float) -> tuple[float, float, float]:
-    """Return where within the motion the arm is, and at which rate."""
+def _path_state(planner: Planner, time: float) -> tuple[float, float, float] | None:
+    """Return where within the motion the arm is, and at which rate; None: it was stopped."""
     index = max(0, planner.controller.index_at(time))
     message = planner.controller.trajectories[index]
     sent = zip(planner.commitments, planner.messages, strict=True)
-    one = next(c for c, m in reversed(list(sent)) if m is message)
+    one = next((c for c, m in reversed(list(sent)) if m is message), None)
+    if one is None:
+        return None
     tau, rate, slope = path_state(one, time)
     return float(tau), float(rate), float(slope)
 

@@ -33,7 +33,7 @@ def costs(case: Case, n: int, seed: int) -> dict[str, list[float]]:
         assert plan.trajectory is not None
         planner = Planner(settings, timing, rng, Controller(q))
         eyes = Eyes(tuple(box.name for box in scene.boxes), scene.numbers, np.zeros(0))
-        planner.begin(plan.trajectory, 0.0)
+        planner.begin(plan)
         k, time = 0, 0.0
         while time < PATIENCE and not planner.has_arrived(time) and not planner.cannot_begin(time):
             time = k * timing.period
@@ -42,7 +42,7 @@ def costs(case: Case, n: int, seed: int) -> dict[str, list[float]]:
             n_before = len(planner.commitments)
             if planner.is_under_way and not planner.commitments[-1].is_whole:
                 at = time + timing.thinking
-                body = eyes.body(at, settings.rules)
+                body = planner.body(at)
                 begin = clock.perf_counter()
                 extended(planner.commitments[-1], at, body, settings)
                 took = clock.perf_counter() - begin

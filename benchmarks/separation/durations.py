@@ -95,12 +95,12 @@ def timed(dead: float, case: Case, plan: MotionPlan, rng: np.random.Generator) -
     assert plan.path is not None and plan.trajectory is not None
     T = tool_pose(settings.arm, plan.path.waypoints[-1])
     target = T[:3, 3] + plan.target_distance * T[:3, 2]
-    motion = planned(scene, plan.path.waypoints[0], target, plan.seed, case).trajectory
-    assert motion is not None
+    separate = planned(scene, plan.path.waypoints[0], target, plan.seed, case)
+    assert separate.trajectory is not None
     timing = Timing(age=dead - DELAY, thinking=0.0, lag=0.0)
-    planner = Planner(settings, timing, rng, Controller(motion.positions[0]))
+    planner = Planner(settings, timing, rng, Controller(separate.trajectory.positions[0]))
     eyes = Eyes(tuple(box.name for box in scene.boxes), scene.numbers, np.zeros(0))
-    planner.begin(motion, 0.0)
+    planner.begin(separate)
     k, time = 0, 0.0
     while time < PATIENCE and not planner.has_arrived(time) and not planner.cannot_begin(time):
         time = k * timing.period

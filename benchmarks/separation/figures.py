@@ -30,16 +30,16 @@ class _Watched(Session):
         super().__init__(Beside(take, case, is_separate=True), Timing(), seed=0)
         self.rates: list[tuple[float, float, float]] = []
 
-    def _with_separation(self, time: float) -> None:
-        super()._with_separation(time)
+    def _go_on(self, time: float) -> None:
+        super()._go_on(time)
         planner = self.planner
         at = time + self.timing.thinking
-        if planner.motion is None or not planner.is_under_way or planner.is_at_rest(at):
+        if planner.plan is None or not planner.is_under_way or planner.is_at_rest(at):
             self.rates.append((at, np.nan, np.nan))
             return
         tau, rate, _ = path_state(planner.commitments[-1], at)
-        body = self.eyes.body(at, self.settings.rules)
-        self.rates.append((at, rate, permitted(planner.motion, tau, body, self.settings)))
+        limit = permitted(planner.motion, tau, planner.body(at), self.settings)
+        self.rates.append((at, rate, limit))
 
 
 def draw(file: Path, take: Take, case: Case) -> Path:

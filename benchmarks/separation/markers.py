@@ -12,11 +12,10 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from rrth_planner.execution.body_motion import body_at, BodyMotion, first_sight, seen_again
+from rrth_planner.execution.event import Sight
 from rrth_planner.kernels.layout import ROTATION, SIZE
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.rotation import quaternion_xyzw
-from rrth_planner.model.separation import SeenBody, SeparationRules
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.body_publishers import BodyPublishers
 from rrth_planner.ros.messages.marker_edits import read_edits
@@ -75,8 +74,7 @@ class MarkerEyes(Eyes):
             marker.ns, marker.text, marker.id = called[rng.integers(len(called))]
         self._unseen, self._age, self._n = unseen, age, 0
         self._order, self._publishers = MarkerOrder(), BodyPublishers()
-        self._known, self._observed = WearerBody(), WearerBody()
-        self._motion: BodyMotion | None = None
+        self._known = WearerBody()
 
     def see(self, rows: Array, taken: float, seen: NDArray[np.bool_] | None = None) -> None:
         """Have a frame, as a message."""
@@ -106,21 +104,13 @@ class MarkerEyes(Eyes):
             keep_removed=KEPT,
         )
 
-    def body(self, time: float, rules: SeparationRules) -> SeenBody:
-        """Return the body at a time [s]."""
+    def sight(self, time: float) -> Sight:
+        """Return what is known of him at a time [s]."""
         body = self._known.at(time)
-        if body is not self._observed:
-            parts = (*body.parts, *body.lost)
-            measured = np.array([part.measured for _, part in parts for _ in part.boxes])
-            scene = scene_of(body)
-            self._motion = (
-                first_sight(scene, measured)
-                if self._motion is None
-                else seen_again(self._motion, scene, measured, rules)
-            )
-            self._observed = body
-        assert self._motion is not None
-        return body_at(self._motion, time, rules)
+        parts = (*body.parts, *body.lost)
+        return Sight(
+            scene_of(body), np.array([part.measured for _, part in parts for _ in part.boxes])
+        )
 
 
 def trials() -> dict[str, Trial]:

@@ -15,9 +15,6 @@ from pathlib import Path
 import sys
 
 import numpy as np
-from rrth_planner.execution.executing_motion import ExecutingMotion
-from rrth_planner.execution.monitored_arm import arm_at_rest, monitored, retargeted, started
-from rrth_planner.execution.remaining_motion import is_remaining_free
 from rrth_planner.io.motion_capture_file import load_person
 from rrth_planner.io.skeleton_file import load_skeleton
 from rrth_planner.kernels.layout import ROTATION, SIZE
@@ -44,10 +41,8 @@ from benchmarks.separation.setting import (
     Case,
     FOLDED,
     planned,
-    required,
     separation_of,
     the_arm,
-    the_settings,
 )
 
 # Targets low in front of the wearer, where his hands work: lower and upper corner [m].
@@ -198,14 +193,15 @@ class Session:
         self.names = parts_of(record.take)
         self.speeds = np.array([speed_bound(self.settings.rules, n) for n in self.names])
         self.controller = Controller(FOLDED)
-        self.planner = Planner(self.settings, timing, self.rng, self.controller)
+        self.planner = Planner(
+            self.settings, timing, self.rng, self.controller, is_separate=record.is_separate
+        )
         rows = record.take.rows(0.0)
         self.eyes = Eyes(self.names, rows, np.zeros(len(rows)))
         self.target: Array | None = None
         self.asked = self.tried = 0.0
         self.plan: MotionPlan | None = None
         self.ready = 0.0
-        self.monitored = arm_at_rest(required(), FOLDED, the_settings().limits)
 
     def run(self, seconds: float) -> None:
         """Run for so long [s]."""
@@ -220,10 +216,7 @@ class Session:
                 self._count_steps(before, rows)
             before = rows
             self.eyes.see(rows, time - self.timing.age, seen)
-            if self.record.is_separate:
-                self._with_separation(time)
-            else:
-                self._without(time)
+            self._go_on(time)
         self.record.seconds = seconds
 
     def _count_steps(self, before: Array, rows: Array) -> None:
@@ -267,76 +260,35 @@ class Session:
         assert self.target is not None
         return pointing_error(self.settings.arm, q, self.target) < AIMS
 
-    def _with_separation(self, time: float) -> None:
+    def _go_on(self, time: float) -> None:
         planner = self.planner
-        scene = self.eyes.scene()
         if self.plan is None:
             self._give_up(time)
-            self._planned(time, planner.place(), scene)
-            if self.plan is not None:
-                assert self.plan.trajectory is not None
-                planner.begin(self.plan.trajectory, time)
-        if self.plan is None or time < self.ready:
+            self._planned(time, planner.place(), self.eyes.scene())
+        plan = self.plan
+        if plan is not None and time >= self.ready and planner.plan is not plan:
+            planner.begin(plan)
+        planner.frame(time, self.eyes)
+        if plan is None or planner.plan is not plan:
             return
-        assert self.plan.trajectory is not None
+        is_at_rest = planner.is_at_rest(time)
         if planner.has_arrived(time):
             self._next(REACHED if self._aims(planner.place()) else NOT_NOW, time)
-            return
-        if planner.cannot_begin(time) or (
-            time - self.asked > PATIENCE and planner.is_at_rest(time)
-        ):
-            self._next(NOT_NOW, time)
-            return
-        whole = ExecutingMotion(
-            trajectory=self.plan.trajectory,
-            start_time=0.0,
-            target_distance=self.plan.target_distance,
-            escape_time=self.plan.escape_time,
-        )
-        phase = min(planner.progress(time), self.plan.trajectory.duration)
-        is_free = is_remaining_free(whole, phase, required(), scene)
-        if is_free and time - self.asked <= PATIENCE:
-            planner.frame(time, self.eyes)
-        elif planner.is_at_rest(time):
+        elif time - self.asked > PATIENCE:
+            if is_at_rest:
+                self._next(NOT_NOW, time)
+            elif not planner.is_stopped:
+                planner.brake()
+        elif is_at_rest and (planner.is_outdated or planner.is_stopped):
+            # The same target, from here.
             self.plan, self.ready, self.tried = None, time, time
-
-    def _without(self, time: float) -> None:
-        at = time + self.timing.thinking + self.rng.uniform(*self.timing.latency)
-        scene = self.eyes.scene()
-        state = self.monitored
-        if self.plan is not None and time >= self.ready and state.motion is None:
-            assert self.plan.trajectory is not None
-            whole = ExecutingMotion(
-                trajectory=self.plan.trajectory,
-                start_time=at,
-                target_distance=self.plan.target_distance,
-                escape_time=self.plan.escape_time,
-            )
-            state = started(state, whole, scene, at)
-            if state.motion is None:
-                self.plan, self.ready, self.tried = None, time, time
-        elif state.motion is not None:
-            state = monitored(state, scene, at)
-            if state.is_at_rest(time):
-                if state.playback.is_stopping:
-                    state = retargeted(state, at)
-                    self.plan, self.ready, self.tried = None, time, time
-                else:
-                    aims = self._aims(state.positions_at(time))
-                    state = retargeted(state, at)
-                    self._next(REACHED if aims else NOT_NOW, time)
-        if state.motion is None and self.plan is None:
-            self._give_up(time)
-            self._planned(time, state.positions_at(time), scene)
-        self.monitored = state
-        playback, given = state.playback, self.controller.trajectories
-        if state.motion is not None and (not given or given[-1] is not playback.trajectory):
-            self.controller.give(playback.trajectory, playback.start_time, at)
+        elif planner.cannot_begin(time):
+            self._next(NOT_NOW, time)
 
     def judge(self) -> None:
         """Count the contacts, instant by instant."""
         found: dict[tuple[int, int], list[tuple[int, str, bool]]] = {}
-        numbers = {id(one.trajectory): i for i, one in enumerate(self.planner.commitments)}
+        numbers = {id(one): i for i, one in enumerate(self.planner.messages)}
         for begin in np.arange(0.0, self.record.seconds, CHUNK):
             times = instants(begin, min(begin + CHUNK, self.record.seconds))
             q, v = self.controller.states(times - self.timing.lag)

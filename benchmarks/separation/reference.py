@@ -79,7 +79,7 @@ def chain_of_motions(n_drawn: int, n: int, seed: int) -> Judged:
             continue
         assert plan.trajectory is not None
         planner = Planner(settings, timing, rng, Controller(q))
-        planner.begin(plan.trajectory, 0.0)
+        planner.begin(plan)
         eyes = Eyes(names, scene.numbers, np.zeros(len(names)))
         k, time = 0, 0.0
         while time < PATIENCE and not planner.has_arrived(time):
@@ -93,6 +93,8 @@ def chain_of_motions(n_drawn: int, n: int, seed: int) -> Judged:
             planner.frame(time, eyes)
             if planner.cannot_begin(time):
                 judged.n_blocked += 1
+                break
+            if planner.is_stopped and planner.is_at_rest(time):
                 break
             k += 1
         judged.n_motions += 1

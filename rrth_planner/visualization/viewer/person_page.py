@@ -9,15 +9,16 @@ from typing import NoReturn
 
 import numpy as np
 from rrth_planner.execution.executing_motion import ExecutingMotion
-from rrth_planner.execution.monitored_arm import arm_at_rest, monitored, retargeted, started
 from rrth_planner.io.urdf.placed_robot import PlacedRobot
 from rrth_planner.model.arrays import Array
-from rrth_planner.model.errors import SceneError
+from rrth_planner.model.errors import RequestError, SceneError
+from rrth_planner.model.goal import PointingGoal
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.visualization.viewer.curves import trajectory_curve
 from rrth_planner.visualization.viewer.panel import Panel
 from rrth_planner.visualization.viewer.planning_worker import Response, ViewerModel
 from rrth_planner.visualization.viewer.scene_view import SceneView
+from rrth_planner.visualization.viewer.shown_arm import ShownArm
 from rrth_planner.wearer.body_boxes import body_boxes
 from rrth_planner.wearer.recorded_person import posture_at, RecordedPerson
 from rrth_planner.wearer.skeleton import Skeleton
@@ -48,7 +49,7 @@ class PersonPage:
         self._person, self._skeleton = person, skeleton
         self._scene = question.scene
         self._margin, self._arm = question.margin, question.arm
-        self._state = arm_at_rest(question.required, question.q_start, question.limits)
+        self._shown = ShownArm(question.required, question.q_start, question.limits)
         self._lock = Lock()
         # Written by the callbacks of the page.
         self._aimed: Array | None = None
@@ -93,19 +94,20 @@ class PersonPage:
             self._target, self._next = aimed, now
             # What is being planned for another target does not count.
             self.asked = 0
-            self._state = retargeted(self._state, now)
-        self._state = monitored(self._state, self._scene, now)
+        self._shown.see(self._scene, now)
+        if aimed is not None:
+            self._shown.retarget()
         self._take_response(now)
-        if not self.asked and now >= self._next and self._state.needs_motion(self._scene, now):
+        if not self.asked and now >= self._next and self._shown.needs_motion:
             self.asked = self.model.ask(
-                scene=self._scene, q_start=self._state.positions_at(now), target=self._target
+                scene=self._scene, q_start=self._shown.positions_at(now), target=self._target
             )
         self.view.move_body(self._scene, self._margin)
-        self.view.show_configuration(self._state.positions_at(now), self._target)
+        self.view.show_configuration(self._shown.positions_at(now), self._target)
 
     def positions_at(self, time: float) -> Array:
         """Return where the arm is at a time [s], (dof,) [rad]."""
-        return self._state.positions_at(time)
+        return self._shown.positions_at(time)
 
     def aim(self, target: Array) -> None:
         """Aim at another target from the next frame on, (3,) in the base frame [m]."""
@@ -129,7 +131,8 @@ class PersonPage:
             target_distance=plan.target_distance,
             escape_time=plan.escape_time,
         )
-        self._state = started(self._state, motion, self._scene, now)
+        with suppress(RequestError):
+            self._shown.begin(motion, PointingGoal(self._target))
         curve = trajectory_curve(self._arm, plan.trajectory)
         self.view.show_path('timed', curve, np.empty((0, 3)))
 
