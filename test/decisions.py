@@ -16,6 +16,7 @@ from rrth_planner.execution.watch import PlainRules, Watch
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.required_clearance import RequiredClearance
 from rrth_planner.model.scene import Box, Scene
+from rrth_planner.model.separation import Separation, SeparationRules
 from rrth_planner.model.trajectory import sample, Trajectory
 import worlds
 
@@ -32,6 +33,15 @@ RULES = PlainRules(
     required=RequiredClearance(ARM, 0.02, 1.0),
     stop_limits=worlds.limits(),
     execution=ExecutionRules(None, 0.0, False),
+)
+# What commitments are proven with, and how late the controller may be then [s].
+DELAY = 0.01
+SEPARATION = Separation(
+    arm=ARM,
+    rules=SeparationRules(contact_speed=0.1, controller_delay=DELAY),
+    margin=0.02,
+    limits=worlds.limits(),
+    stop_limits=worlds.limits(),
 )
 
 

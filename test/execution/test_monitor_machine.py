@@ -4,7 +4,7 @@
 
 from dataclasses import replace
 
-from decisions import ARM, BEGIN, FAR, GOAL, hand, idle, RULES as AT_ONCE, turn
+from decisions import ARM, BEGIN, DELAY, FAR, GOAL, hand, idle, RULES as AT_ONCE, SEPARATION, turn
 from hypothesis import settings, strategies as st
 from hypothesis.stateful import initialize, invariant, rule, RuleBasedStateMachine
 import numpy as np
@@ -18,18 +18,8 @@ from rrth_planner.execution.step import following, step_of
 from rrth_planner.execution.watch import MonitorState
 from rrth_planner.model.errors import RequestError
 from rrth_planner.model.scene import Scene
-from rrth_planner.model.separation import Separation, SeparationRules
 from rrth_planner.model.trajectory import sample, Trajectory
-import worlds
 
-DELAY = 0.01
-SEPARATION = Separation(
-    arm=ARM,
-    rules=SeparationRules(contact_speed=0.1, controller_delay=DELAY),
-    margin=0.02,
-    limits=worlds.limits(),
-    stop_limits=worlds.limits(),
-)
 RULES = [
     replace(AT_ONCE, execution=ExecutionRules(None, DELAY, False)),
     replace(AT_ONCE, execution=ExecutionRules(SEPARATION, DELAY, False)),

@@ -5,7 +5,21 @@
 from dataclasses import replace
 import math
 
-from decisions import ARM, begun, body, FAR, GOAL, hand, idle, on, RULES, turn
+from decisions import (
+    ARM,
+    BEGIN,
+    begun,
+    body,
+    DELAY,
+    FAR,
+    GOAL,
+    hand,
+    idle,
+    on,
+    RULES,
+    SEPARATION,
+    turn,
+)
 import numpy as np
 import pytest
 from rrth_planner.execution import event as events
@@ -17,19 +31,9 @@ from rrth_planner.execution.step import Fate, following, step_of
 from rrth_planner.execution.watch import Level, MonitorState
 from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.separation import Separation, SeparationRules
 from rrth_planner.model.trajectory import Trajectory
-import worlds
 
-BEGIN, DELAY = 100.0, 0.01
 MOTION = turn()
-SEPARATION = Separation(
-    arm=ARM,
-    rules=SeparationRules(contact_speed=0.1, controller_delay=DELAY),
-    margin=0.02,
-    limits=worlds.limits(),
-    stop_limits=worlds.limits(),
-)
 SEPARATED = replace(RULES, execution=ExecutionRules(SEPARATION, DELAY, False))
 
 
