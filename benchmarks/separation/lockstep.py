@@ -222,8 +222,8 @@ class Planner:
         assert self.plan is not None and self.plan.trajectory is not None
         return self.plan.trajectory
 
-    def begin(self, plan: MotionPlan) -> None:
-        """Have a motion that begins where the arm is at rest, as soon as it may."""
+    def begin(self, plan: MotionPlan | None) -> None:
+        """Have a motion that begins where the arm is at rest, as soon as it may; None: no more."""
         self.plan, self.blocked_since = plan, None
         self.is_under_way = self.is_outdated = False
 

@@ -233,7 +233,13 @@ class Session:
         self.record.outcomes[outcome] += 1
         if outcome == REACHED:
             self.record.times.append(time - self.asked)
-        self.target, self.plan = None, None
+        self.target = None
+        self._drop()
+
+    def _drop(self) -> None:
+        """Have no motion any more: the arm rests."""
+        self.plan = None
+        self.planner.begin(None)
 
     def _give_up(self, time: float) -> None:
         """Have no target any more if it has taken too long."""
@@ -281,7 +287,8 @@ class Session:
                 planner.brake()
         elif is_at_rest and (planner.is_outdated or planner.is_stopped):
             # The same target, from here.
-            self.plan, self.ready, self.tried = None, time, time
+            self._drop()
+            self.ready = self.tried = time
         elif planner.cannot_begin(time):
             self._next(NOT_NOW, time)
 
