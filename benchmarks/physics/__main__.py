@@ -31,12 +31,10 @@ def print_servos(options: argparse.Namespace) -> None:
     print_head('servos: motions round a wearer at rest, half of them stopped', servos.HEADER)
     n = min(servos.CHAIN, max(1, options.motions // (len(servos.LAGS) * len(servos.DELAYS))))
     seeds = range(options.seed, options.seed + math.ceil(options.motions / n))
-    print(
-        '\n'.join(
-            servos.lines_of(each(servos.chain_of_motions, seeds, options.jobs, 'servos', n))
-        ),
-        flush=True,
-    )
+    found = each(servos.chain_of_motions, seeds, options.jobs, 'servos', n)
+    print('\n'.join(servos.lines_of(found)), flush=True)
+    n_other = sum(one.n_other for one in found)
+    print(f'\nMotions that the monitor stopped or gave up by itself: {n_other}.', flush=True)
 
 
 def print_people(options: argparse.Namespace) -> None:

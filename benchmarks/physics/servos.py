@@ -225,6 +225,7 @@ class _Execution:
         if self.n_states % BODIES == 0:
             self.monitor.take(BodyCame(self._moment(), None, self._look()))
         watch = self.monitor.watch
+        assert watch.n_faults == 0, watch.stop_reason
         if watch.running is not None:
             self.judged.n_states += 1
             phase = tracked_phase(watch.tracked, self.reading, state.time)

@@ -241,6 +241,8 @@ class Planner:
         self._note()
         if self.plan is not None and not self.is_under_way:
             self._try_begin()
+        # An error of the monitor stops the arm for good, which would look like prudence.
+        assert self.monitor.watch.n_faults == 0, self.monitor.watch.stop_reason
 
     def brake(self) -> None:
         """Stop the arm, since its motion is given up."""
