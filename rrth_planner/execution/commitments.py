@@ -407,7 +407,8 @@ def extend(
     has_changed = found is not known
     if found.fault:
         return Extension(found, None, None, has_changed)
-    return changed(_extended(found, now, is_clear), has_changed=has_changed)
+    extension = _extended(found, now, is_clear)
+    return changed(extension, has_changed=True) if has_changed else extension
 
 
 def _extended(known: Commitments, now: float, is_clear: Callable[[Trajectory], bool]) -> Extension:
@@ -437,7 +438,7 @@ def _extended(known: Commitments, now: float, is_clear: Callable[[Trajectory], b
         ):
             # From here on the motion is given in stretches.
             present = changed(present, stretch=elapsed)
-    as_before = changed(as_before, commitments=known)
+        as_before = changed(as_before, commitments=known)
     seen = body_at(body, start, separation.rules)
     found = extended(present, start, seen, _stretched(known, separation), is_clear)
     if found is None:

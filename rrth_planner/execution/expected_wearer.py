@@ -29,6 +29,8 @@ def expected_scene(before: Scene, present: Scene, elapsed: float) -> Scene:
     boxes = present.numbers
     velocities = (boxes[known, :SIZE] - before.numbers[old[known], :SIZE]) / elapsed
     is_moving = np.linalg.norm(velocities, axis=1) > SLOW
+    if not is_moving.any():
+        return Scene(())
     # With very many parts there is room for the last times only.
     times = np.array(AHEAD[-max(1, MAX_BOXES // max(1, int(is_moving.sum()))) :])
     # Part by part, each at all times.

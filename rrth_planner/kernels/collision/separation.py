@@ -92,6 +92,16 @@ def line_from_box(points, at, rows, box, line):
         line[r], line[3 + r] = first, last
 
 
+@kernel(float64(OUT_VEC, MAT, int64), is_inlined=True, is_inner=True)
+def line_gap(line, rows, box):
+    """Return the distance of a line, as from `line_from_box`, along the axes of a box [m]."""
+    gap = -math.inf
+    for r in range(3):
+        first, last, half = line[r], line[3 + r], rows[BOX_HALF + r, box]
+        gap = max(gap, min(first, last) - half, -max(first, last) - half)
+    return gap
+
+
 @kernel(float64(OUT_VEC, float64, float64, float64, MAT, int64), is_inlined=True, is_inner=True)
 def part_within(line, low, high, distance, rows, box):
     """
@@ -297,10 +307,15 @@ def latest_times(points, bodies, dof, robot, rows, growths, speeds, latest):
         at, radius = BAR_SIZE * bar, points[BAR_SIZE * bar + 7]
         for section in range(SECTIONS):
             latest[SECTIONS * bar + section] = LATEST
+        last = LATEST
         for box in range(m):
             if may_meet(rows, box, bar):
                 continue
             line_from_box(points, at, rows, box, line)
+            # Further from the whole bar it matters to no section.
+            if line_gap(line, rows, box) > radius + growths[box] + speeds[box] * last:
+                continue
+            last = -1.0
             for section in range(SECTIONS):
                 low, high = section / SECTIONS, (section + 1) / SECTIONS
                 best = latest[SECTIONS * bar + section]
@@ -311,6 +326,7 @@ def latest_times(points, bodies, dof, robot, rows, growths, speeds, latest):
                 if room < speeds[box] * best:
                     best = room / speeds[box] if speeds[box] > 0.0 and room >= 0.0 else -1.0
                     latest[SECTIONS * bar + section] = best
+                last = max(last, best)
 
 
 @kernel(
