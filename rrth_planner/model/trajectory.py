@@ -319,8 +319,8 @@ def part_of(
     end = min(max(end, 0.0), trajectory.duration)
     if end <= begin:
         return through(np.zeros(1), _state_by(trajectory, end, 0.0, curves_of)[:, None])
-    i = times.searchsorted(begin + NEAR_POINT, side='right')
-    n = max(0, times.searchsorted(end - NEAR_POINT) - i)
+    i = int(times.searchsorted(begin + NEAR_POINT, side='right'))
+    n = max(0, int(times.searchsorted(end - NEAR_POINT)) - i)
     points, states = np.empty(n + 2), np.empty((3, n + 2, trajectory.positions.shape[1]))
     points[0], points[1:-1], points[-1] = 0.0, times[i : i + n] - begin, end - begin
     states[:, 0] = _state_by(trajectory, begin, NEAR_POINT, curves_of)
