@@ -13,8 +13,9 @@ from rrth_planner.kernels import jit
 from rrth_planner.kernels.collision.separation import first_blocked, permitted_rates
 from rrth_planner.model.arm import ArmModel, bars_of
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.curves import curves_of
 from rrth_planner.model.separation import growth_at, SeenBody, Separation, SeparationRules
-from rrth_planner.model.trajectory import piece_coefficients, Trajectory
+from rrth_planner.model.trajectory import Trajectory
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +83,7 @@ def permitted_ahead(
     arm, rules = settings.arm, settings.rules
     found = np.empty((n_rates, 3))
     permitted_rates(
-        piece_coefficients(motion),
+        curves_of(motion),
         motion.times,
         places,
         n_rates,
@@ -106,10 +107,10 @@ def _arm_numbers(arm: ArmModel) -> jit.Arm:
 
 def _body_numbers(arm: ArmModel, body: SeenBody, growths: Array) -> jit.Body:
     """Return a wearer as the kernels take him; growths (m,): of the boxes [m]."""
-    allowed = allowed_bars(arm, body.scene)
-    for array in (allowed, growths):
-        array.setflags(write=False)
-    return jit.Body(body.scene.numbers, allowed, mount_inverse(arm), growths, body.speeds)
+    growths.setflags(write=False)
+    scene = body.scene
+    allowed = allowed_bars(arm, scene)
+    return jit.Body(scene.numbers, allowed, mount_inverse(arm), growths, body.speeds)
 
 
 @functools.lru_cache(maxsize=16)

@@ -157,6 +157,18 @@ class World(Frozen):
             arm_validity.is_configuration_free(q, ray, self.chain, self.robot, self.obstacles)
         )
 
+    def first_free(self, q: ArrayLike, way: ArrayLike, shares: Array, n_halvings: int) -> float:
+        """
+        Return the first share of a way from q, (dof,) each, at which the arm is valid, else NaN.
+
+        shares (m,): tried one after the other while the arm is within the joints' limits, as far
+        apart as the first is from 0; what is between the last two is halved so often.
+        """
+        q, way = self._configuration(q), self._configuration(way, 'way')
+        address = jit.address(self.chain)
+        place = self.ray_length, address, self.robot, self.obstacles, self.bounds
+        return float(arm_validity.first_free(q, way, shares, n_halvings, *place))
+
     def is_edge_valid(self, q_from: ArrayLike, q_to: ArrayLike) -> bool:
         """Return whether the straight motion between two configurations is proven free."""
         q_from, q_to = self._configuration(q_from, 'q_from'), self._configuration(q_to, 'q_to')
@@ -248,7 +260,7 @@ def world_of(required: RequiredClearance, scene: Scene) -> World:
         contacts=CONTACTS,
         resolution=RESOLUTION,
         bar_names=tuple(bar_names(arm)),
-        box_names=tuple(box.name for box in scene.boxes),
+        box_names=scene.names,
         lanes=lanes,
         pair_names=tuple(pair_names(arm, pair) for pair in pairs_of(arm)),
     )
@@ -326,10 +338,17 @@ def robot_rows(arm: ArmModel, ray_length: float) -> Array:
 
 
 def allowed_bars(arm: ArmModel, scene: Scene) -> NDArray[np.int64]:
-    """Return which bars may meet each box, (m,): bit k for bar k."""
-    allowed = np.zeros(len(scene.boxes), np.int64)
+    """Return which bars may meet each box, (m,), read-only: bit k for bar k."""
+    return _allowed_bars(arm, scene.names)
+
+
+# The same parts come with every body.
+@functools.lru_cache(maxsize=64)
+def _allowed_bars(arm: ArmModel, names: tuple[str, ...]) -> NDArray[np.int64]:
+    allowed = np.zeros(len(names), np.int64)
     for name, bars in _bars_by_name(arm).items():
-        allowed[[is_called(box.name, name) for box in scene.boxes]] |= bars
+        allowed[[is_called(one, name) for one in names]] |= bars
+    allowed.setflags(write=False)
     return allowed
 
 

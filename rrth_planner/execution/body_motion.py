@@ -4,11 +4,10 @@
 
 from dataclasses import dataclass, replace
 import functools
-import itertools
 
 import numpy as np
 from numpy.typing import NDArray
-from rrth_planner.kernels.layout import ROTATION, SIZE
+from rrth_planner.kernels.collision.boxes import longest_ways
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.separation import FASTEST, SeenBody, SeparationRules, speed_bound
@@ -22,8 +21,6 @@ SHORTEST = 2e-3
 WINDOW = 0.1
 # Clocks may differ by so much; the age of what was measured later than that [s].
 CLOCK_STEP, UNKNOWN_AGE = 0.1, 1e3
-# The corners of a box, in halves of its size.
-_CORNERS = 0.5 * np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -85,7 +82,7 @@ def seen_again(
     and two errors explain, since the sight before or since an earlier one. Its bound is raised for
     a while then. Parts are known by their names.
     """
-    old, names = places_of(before.scene, scene), _names(scene)
+    old, names = places_of(before.scene, scene), scene.names
     known = old >= 0
     then, n = old[known], len(names)
     speeds, until = np.zeros(n), np.zeros(n)
@@ -124,11 +121,16 @@ def _moved_since(
 ) -> tuple[Array, Array]:
     """Return how long ago parts were at a sight [s], 0: never, and how far they moved [m]."""
     (then, times), n = before, len(scene.boxes)
+    elapsed, moved = np.zeros(n), np.zeros(n)
+    if then.names == scene.names:
+        longest_ways(then.numbers, scene.numbers, moved)
+        return measured - times, moved
     old = places_of(then, scene)
     known = old >= 0
-    elapsed, moved = np.zeros(n), np.zeros(n)
     elapsed[known] = measured[known] - times[old[known]]
-    moved[known] = _displacements(then.numbers[old[known]], scene.numbers[known])
+    ways = np.empty(int(known.sum()))
+    longest_ways(then.numbers[old[known]], scene.numbers[known], ways)
+    moved[known] = ways
     return elapsed, moved
 
 
@@ -144,11 +146,7 @@ def body_at(body: BodyMotion, time: float, rules: SeparationRules) -> SeenBody:
 
 def stated_speeds(scene: Scene, rules: SeparationRules) -> Array:
     """Return the greatest speeds that are assumed of the boxes of a scene, (m,) [m/s]."""
-    return _speeds(_names(scene), rules)
-
-
-def _names(scene: Scene) -> tuple[str, ...]:
-    return tuple(box.name for box in scene.boxes)
+    return _speeds(scene.names, rules)
 
 
 @functools.lru_cache(maxsize=16)
@@ -160,7 +158,7 @@ def _speeds(names: tuple[str, ...], rules: SeparationRules) -> Array:
 
 def places_of(before: Scene, after: Scene) -> NDArray[np.intp]:
     """Return which box of a scene is which one of the scene before, -1: none, (m,)."""
-    return _matches(_names(before), _names(after))
+    return _matches(before.names, after.names)
 
 
 @functools.lru_cache(maxsize=64)
@@ -172,17 +170,3 @@ def _matches(before: tuple[str, ...], after: tuple[str, ...]) -> NDArray[np.intp
     for i, name in enumerate(before):
         places.setdefault(name, []).append(i)
     return np.array([places[n].pop(0) if places.get(n) else -1 for n in after], dtype=np.intp)
-
-
-def _displacements(before: Array, after: Array) -> Array:
-    """Return how far the corners of boxes moved at most, (n, 15) twice -> (n,) [m]."""
-    if len(before) == 0:
-        return np.zeros(0)
-    moved = _corners(after) - _corners(before)
-    return np.asarray(np.sqrt((moved * moved).sum(axis=2)).max(axis=1))
-
-
-def _corners(boxes: Array) -> Array:
-    size, rotation = boxes[:, SIZE:ROTATION], boxes[:, ROTATION:].reshape(-1, 3, 3)
-    corners: Array = boxes[:, None, :SIZE] + (_CORNERS * size[:, None]) @ rotation.swapaxes(1, 2)
-    return corners

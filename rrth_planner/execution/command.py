@@ -9,13 +9,12 @@ published, with the motion that it replaces, and leaves that only once every con
 no controller has to make a piece of its own, and a late one misses nothing.
 """
 
-from dataclasses import replace
-
 import numpy as np
 from rrth_planner.execution.executing_motion import ExecutingMotion
-from rrth_planner.model.arrays import Array
+from rrth_planner.model.curves import motion_through, part
 from rrth_planner.model.errors import RrthError
-from rrth_planner.model.trajectory import MotionLimits, part_of, Trajectory
+from rrth_planner.model.frozen import changed
+from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.timing.fast_stop import fast_stop
 
 # A controller samples a message up to a cycle after it has it; it runs at 200 Hz or faster. In
@@ -46,28 +45,29 @@ def lead_in(before: Trajectory, begin: float, end: float) -> Trajectory:
     """Return what is commanded between two times of a motion [s], and at rest after its end."""
     begin = min(max(begin, 0.0), end)
     if end <= before.duration:
-        return part_of(before, begin, end)
-    motion = part_of(before, begin, before.duration)
-    rest = np.array([max(end - max(begin, before.duration), 0.0)])
-    still = np.zeros_like(motion.positions[-1:])
-    return Trajectory(
-        np.concatenate([motion.times, motion.duration + rest]),
-        np.concatenate([motion.positions, motion.positions[-1:]]),
-        np.concatenate([motion.velocities[:-1], still, still]),
-        np.concatenate([motion.accelerations[:-1], still, still]),
-    )
+        return part(before, begin, end)
+    motion = part(before, begin, before.duration)
+    n, dof = motion.positions.shape
+    times, states = np.empty(n + 1), np.zeros((3, n + 1, dof))
+    times[:n] = motion.times
+    times[n] = motion.duration + max(end - max(begin, before.duration), 0.0)
+    states[0, :n], states[0, n] = motion.positions, motion.positions[-1]
+    # At rest from its end on.
+    states[1, : n - 1], states[2, : n - 1] = motion.velocities[:-1], motion.accelerations[:-1]
+    return motion_through(times, states)
 
 
 def rest_at(motion: Trajectory, duration: float) -> Trajectory:
     """Return a rest where a motion begins, for some time before it [s]; 0: only that point."""
     still = np.zeros_like(motion.positions[:1])
     place = Trajectory(np.zeros(1), motion.positions[:1], still, still)
-    return lead_in(place, 0.0, duration) if duration > 0.0 else part_of(motion, 0.0, 0.0)
+    return lead_in(place, 0.0, duration) if duration > 0.0 else part(motion, 0.0, 0.0)
 
 
 def continues(lead: Trajectory, after: Trajectory) -> bool:
     """Return whether a motion begins with the state in which its lead-in ends."""
-    return bool((_gaps(lead, after) <= np.array(SAME_STATE)).all())
+    gaps = zip(_gaps(lead, after), SAME_STATE, strict=True)
+    return all(gap <= largest for gap, largest in gaps)
 
 
 def led(lead: Trajectory, after: ExecutingMotion) -> ExecutingMotion:
@@ -89,16 +89,17 @@ def led(lead: Trajectory, after: ExecutingMotion) -> ExecutingMotion:
             f'{SAME_STATE[2]:g}'
         )
     end = lead.duration
-    is_kept = np.append(lead.times[:-1] < end - NEAR_END, False)
-    is_kept[0] = end > 0.0
-    times = np.concatenate([lead.times[is_kept], end + motion.times])
-    states = (
-        np.concatenate([one[is_kept], other])
-        for one, other in zip(lead.states, motion.states, strict=True)
-    )
-    return replace(
+    # The first point stays, however near to the end it is.
+    kept = int(lead.times[:-1].searchsorted(end - NEAR_END)) if end > 0.0 else 0
+    kept = max(kept, int(end > 0.0))
+    n, dof = motion.positions.shape
+    times, states = np.empty(kept + n), np.empty((3, kept + n, dof))
+    times[:kept], times[kept:] = lead.times[:kept], end + motion.times
+    for row, one, other in zip(states, lead.states, motion.states, strict=True):
+        row[:kept], row[kept:] = one[:kept], other
+    return changed(
         after,
-        trajectory=Trajectory(times, *states),
+        trajectory=motion_through(times, states),
         start_time=after.start_time - end,
         escape_time=after.escape_time + end if after.escape_time > 0.0 else 0.0,
     )
@@ -127,7 +128,7 @@ def stop_along(
     return ExecutingMotion(trajectory=stop, start_time=now - back)
 
 
-def _gaps(lead: Trajectory, after: Trajectory) -> Array:
-    """Return how far apart the states are where two motions meet, (3,)."""
+def _gaps(lead: Trajectory, after: Trajectory) -> list[float]:
+    """Return how far apart the states are where two motions meet: three numbers."""
     pairs = zip(lead.states, after.states, strict=True)
-    return np.array([np.abs(one[-1] - other[0]).max() for one, other in pairs])
+    return [max(map(abs, (one[-1] - other[0]).tolist())) for one, other in pairs]

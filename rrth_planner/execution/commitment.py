@@ -9,8 +9,9 @@ import math
 import numpy as np
 from rrth_planner.collision.separation import Blocked, first_unproven, permitted_ahead
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.curves import part, state_at, states_at
 from rrth_planner.model.separation import SeenBody, Separation
-from rrth_planner.model.trajectory import part_of, sample, Trajectory
+from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.timing.fast_stop import fast_stop
 from rrth_planner.timing.rate_profile import (
     continued,
@@ -98,16 +99,16 @@ def path_state(commitment: Commitment, time: float) -> Array:
         return rate_state(commitment.profile, max(elapsed, 0.0))
     begin = float(rate_state(commitment.profile, commitment.stretch)[0])
     motion, stop = commitment.motion, commitment.trajectory
-    q, v, a = (row[0] for row in sample(stop, [min(elapsed, stop.duration)]))
+    q, v, a = state_at(stop, min(elapsed, stop.duration))
     # Between its points a stop is up to 1e-4 rad from the path: the nearest place of that counts.
     ahead = min(motion.duration, begin + elapsed - commitment.stretch)
     places = np.linspace(begin, ahead, 2 + int((ahead - begin) / SPACING))
-    gaps = ((sample(motion, places)[0] - q) ** 2).sum(axis=1)
+    gaps = ((states_at(motion, places)[0] - q) ** 2).sum(axis=1)
     tau = float(places[int(gaps.argmin())])
     for _ in range(4):
-        p, w, _ = (row[0] for row in sample(motion, [tau]))
+        p, w, _ = state_at(motion, tau)
         tau = min(max(tau + float((q - p) @ w) / max(float(w @ w), 1e-12), begin), ahead)
-    _, w, b = (row[0] for row in sample(motion, [tau]))
+    _, w, b = state_at(motion, tau)
     square = max(float(w @ w), 1e-12)
     rate = min(max(float(v @ w) / square, 0.0), 1.0)
     return np.array([tau, rate, float((a - b * rate**2) @ w) / square])
@@ -261,5 +262,5 @@ def _committed(
             )
     if blocked is None:
         # No rate could be tried: the motion itself says what is in its way.
-        is_proven(part_of(motion, float(state[0]), motion.duration))
+        is_proven(part(motion, float(state[0]), motion.duration))
     return blocked

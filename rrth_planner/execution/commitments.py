@@ -27,10 +27,11 @@ from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.joint_reading import JointReading
 from rrth_planner.execution.separation_status import SeparationState, SeparationStatus
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.curves import part, state_at
 from rrth_planner.model.frozen import changed
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.separation import Separation
-from rrth_planner.model.trajectory import part_of, positions_at, Trajectory
+from rrth_planner.model.trajectory import Trajectory
 
 # At a lower rate the arm is slowed down for the wearer.
 FULL_RATE = 0.995
@@ -406,7 +407,8 @@ def extend(
     has_changed = found is not known
     if found.fault:
         return Extension(found, None, None, has_changed)
-    return changed(_extended(found, now, is_clear), has_changed=has_changed)
+    extension = _extended(found, now, is_clear)
+    return changed(extension, has_changed=True) if has_changed else extension
 
 
 def _extended(known: Commitments, now: float, is_clear: Callable[[Trajectory], bool]) -> Extension:
@@ -432,11 +434,11 @@ def _extended(known: Commitments, now: float, is_clear: Callable[[Trajectory], b
     if present.is_whole:
         known = check_news(known, now)
         if known.has_lost_proof or not is_clear(
-            part_of(present.trajectory, elapsed, present.trajectory.duration)
+            part(present.trajectory, elapsed, present.trajectory.duration)
         ):
             # From here on the motion is given in stretches.
             present = changed(present, stretch=elapsed)
-    as_before = changed(as_before, commitments=known)
+        as_before = changed(as_before, commitments=known)
     seen = body_at(body, start, separation.rules)
     found = extended(present, start, seen, _stretched(known, separation), is_clear)
     if found is None:
@@ -474,7 +476,7 @@ def is_separate(known: Commitments, motion: ExecutingMotion, now: float) -> bool
     curve = motion.trajectory
     if since >= curve.duration:
         return True
-    rest = part_of(curve, since, curve.duration) if since > 0.0 else curve
+    rest = part(curve, since, curve.duration) if since > 0.0 else curve
     seen = body_at(known.body, max(now, motion.start_time), separation.rules)
     margin = separation.margin + JUMP_WAY
     rules, arm = separation.rules, separation.arm
@@ -558,14 +560,14 @@ def _commanded(known: Commitments, time: float) -> Array:
     recent = [sent.commitment for sent in known.recent]
     commitment = next((c for c in reversed(recent) if c.start_time <= time), recent[0])
     elapsed = min(max(time - commitment.start_time, 0.0), commitment.trajectory.duration)
-    place: Array = positions_at(commitment.trajectory, [elapsed])[0]
+    place: Array = state_at(commitment.trajectory, elapsed)[0]
     return place
 
 
 def _place_on(motion: ExecutingMotion, time: float) -> Array:
     """Return where a motion is at a time [s], (dof,) [rad]."""
     elapsed = min(max(time - motion.start_time, 0.0), motion.trajectory.duration)
-    place: Array = positions_at(motion.trajectory, [elapsed])[0]
+    place: Array = state_at(motion.trajectory, elapsed)[0]
     return place
 
 
@@ -574,7 +576,7 @@ def _gap(commitment: Commitment, reading: JointReading, time_ago: float) -> floa
     curve = commitment.trajectory
     time = reading.taken - time_ago - commitment.start_time
     time = min(max(time, 0.0), curve.duration)
-    return float(np.abs(positions_at(curve, [time])[0] - reading.positions).max())
+    return float(np.abs(state_at(curve, time)[0] - reading.positions).max())
 
 
 def _sent(commitment: Commitment, planned: ExecutingMotion, lead: Trajectory) -> Sent:

@@ -302,7 +302,8 @@ def _without_news(found: Decision, stop: events.StopFor) -> Decision:
     """Stop the arm where news of the wearer leave the whole rest of its motion unproven."""
     if found.otherwise is not None:
         # What is published is proven.
-        return changed(found, otherwise=_without_news(found.otherwise, stop))
+        otherwise = _without_news(found.otherwise, stop)
+        return found if otherwise is found.otherwise else changed(found, otherwise=otherwise)
     known = given.check_news(found.watch.commitments, stop.at.now)
     if known is found.watch.commitments and not known.has_lost_proof:
         return found
@@ -358,9 +359,11 @@ def _is_clear(watch: Watch, scene: Scene, expected: Scene, curve: Trajectory) ->
 
 def _is_soon_clear(watch: Watch, expected: Scene, curve: Trajectory) -> bool:
     """Return whether a stretch and all its stop are free of where the wearer will be soon."""
+    if not expected.boxes:
+        return True
     assert watch.running is not None
     motion = changed(watch.running, trajectory=curve, target_distance=0.0, escape_time=0.0)
-    return not expected.boxes or holds(watch, is_remaining_free, motion, 0.0, expected)
+    return holds(watch, is_remaining_free, motion, 0.0, expected)
 
 
 def _extended(watch: Watch, at: Moment, is_clear: IsClear = _always) -> Decision:

@@ -9,10 +9,10 @@ import math
 import numpy as np
 from rrth_planner.kernels.trajectory.quintics import time_on
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.curves import curves_of, state_at, states_at
 from rrth_planner.model.trajectory import (
     MotionState,
     near_point,
-    piece_coefficients,
     positions_at,
     REST_SPEED,
     sample,
@@ -115,7 +115,7 @@ class ExecutingMotion:
         at = math.nan if len(self.trajectory.times) == 1 else self._place(q, guess)
         if not at > BEGINNING:
             return False
-        return bool(np.abs(positions_at(self.trajectory, [at])[0] - q).max() <= SAME_POSITION)
+        return bool(np.abs(state_at(self.trajectory, at)[0] - q).max() <= SAME_POSITION)
 
     def follows(self, q: Array, v: Array, taken: float, lag: float) -> bool:
         """
@@ -138,15 +138,16 @@ class ExecutingMotion:
 
     def _commanded(self, taken: float, lag: float) -> tuple[Array, Array]:
         """Return positions and velocities that were commanded within a lag until a time [s]."""
-        ago = np.linspace(lag, 0.0, 2 + int(lag / SPACING))
-        return sample(self.trajectory, taken - self.start_time - ago)[:2]
+        ago = _lags(lag)
+        places, paces, _ = states_at(self.trajectory, taken - self.start_time - ago)
+        return places, paces
 
     def is_on_time(self, q: Array, v: Array, taken: float) -> bool:
         """Return whether an arm had positions and velocities of the motion at a time [s]."""
         since = taken - self.start_time
         if not BEGINNING <= since <= self.trajectory.duration:
             return False
-        wanted, pace, _ = (values[0] for values in sample(self.trajectory, [since]))
+        wanted, pace, _ = state_at(self.trajectory, since)
         return bool(np.abs(wanted - q).max() <= ON_TIME and np.abs(pace - v).max() <= REST_SPEED)
 
     def will_move(self, time: float, span: float) -> bool:
@@ -156,7 +157,7 @@ class ExecutingMotion:
 
     def near(self, guess: float, q: Array, same: float = math.inf) -> float:
         """Return when [s], near a guess, the motion passes q; NaN if not within `same` [rad]."""
-        curves = piece_coefficients(self.trajectory)
+        curves = curves_of(self.trajectory)
         return float(time_on(curves, self.trajectory.times, guess, q, same, SLOW, LATEST))
 
     def gap(self, q: Array, taken: float) -> float:
@@ -164,7 +165,15 @@ class ExecutingMotion:
         at = self.phase(q, taken, taken)
         if at is None:
             return math.inf
-        return float(np.abs(positions_at(self.trajectory, [at])[0] - q).max())
+        return float(np.abs(state_at(self.trajectory, at)[0] - q).max())
+
+
+@functools.lru_cache(maxsize=8)
+def _lags(longest: float) -> Array:
+    """Return times ago from the longest to none, read-only [s]."""
+    ago = np.linspace(longest, 0.0, 2 + int(longest / SPACING))
+    ago.setflags(write=False)
+    return ago
 
 
 def is_same(motion: ExecutingMotion, other: ExecutingMotion) -> bool:
@@ -217,7 +226,7 @@ def predict_start_state(
     phase, rate = found
     # At a point of the motion where there is one: no piece of the next motion is too short.
     time = near_point(running, min(phase + rate * ahead, running.duration))
-    q, v, a = (values[0] for values in sample(running, [time]))
+    q, v, a = state_at(running, time)
     return StartState(
         state=MotionState(positions=q, velocities=v, accelerations=a), running=running, time=time
     )
@@ -258,9 +267,9 @@ def phase_of(
         return None
     for _ in range(3):
         # The nearest point, by Newton's method.
-        p, w, _ = (values[0] for values in sample(running, [phase]))
+        p, w, _ = state_at(running, phase)
         phase = float(np.clip(phase + (q - p) @ w / (w @ w + 1e-300), 0.0, running.duration))
-    p, w, _ = (values[0] for values in sample(running, [phase]))
+    p, w, _ = state_at(running, phase)
     rate = float(v @ w / (w @ w + 1e-300))
     is_same = np.abs(q - p).max() <= same[0] and np.abs(v - rate * w).max() <= same[1]
     return (phase, rate) if is_same else None

@@ -2,16 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where the wearer's parts will be soon, if they go on as they move."""
 
-from dataclasses import replace
-
 import numpy as np
 from rrth_planner.execution.body_motion import places_of
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.remaining_motion import is_remaining_free
 from rrth_planner.kernels.layout import MAX_BOXES, SIZE
+from rrth_planner.model.curves import part
+from rrth_planner.model.frozen import changed
 from rrth_planner.model.required_clearance import RequiredClearance
-from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.trajectory import part_of
+from rrth_planner.model.scene import Scene, scene_of_rows
 
 # A part is looked for at these times, if it goes on: about as long as a stop takes [s].
 AHEAD = (0.1, 0.2, 0.3)
@@ -30,16 +29,15 @@ def expected_scene(before: Scene, present: Scene, elapsed: float) -> Scene:
     boxes = present.numbers
     velocities = (boxes[known, :SIZE] - before.numbers[old[known], :SIZE]) / elapsed
     is_moving = np.linalg.norm(velocities, axis=1) > SLOW
+    if not is_moving.any():
+        return Scene(())
     # With very many parts there is room for the last times only.
-    times = AHEAD[-max(1, MAX_BOXES // max(1, int(is_moving.sum()))) :]
-    expected = []
-    for i, velocity in zip(known[is_moving], velocities[is_moving], strict=True):
-        for time in times:
-            row = boxes[i].copy()
-            row[:SIZE] += time * velocity
-            row.setflags(write=False)
-            expected.append(Box.of_row(present.boxes[i].name, row))
-    return Scene(tuple(expected))
+    times = np.array(AHEAD[-max(1, MAX_BOXES // max(1, int(is_moving.sum()))) :])
+    # Part by part, each at all times.
+    places = np.repeat(known[is_moving], len(times))
+    rows = boxes[places]
+    rows[:, :SIZE] += (times[:, None] * velocities[is_moving][:, None]).reshape(-1, SIZE)
+    return scene_of_rows(tuple([present.names[i] for i in places.tolist()]), rows)
 
 
 def is_expected_free(
@@ -53,6 +51,6 @@ def is_expected_free(
     """
     if not expected.boxes or phase < running.escape_time:
         return True
-    stretch = part_of(running.trajectory, phase, phase + AHEAD[-1])
-    ahead = replace(running, trajectory=stretch, target_distance=0.0, escape_time=0.0)
+    stretch = part(running.trajectory, phase, phase + AHEAD[-1])
+    ahead = changed(running, trajectory=stretch, target_distance=0.0, escape_time=0.0)
     return is_remaining_free(ahead, 0.0, required, expected)

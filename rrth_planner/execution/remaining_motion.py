@@ -16,6 +16,7 @@ from rrth_planner.collision.world import (
     world_of,
 )
 from rrth_planner.execution.executing_motion import ExecutingMotion
+from rrth_planner.kernels import jit
 from rrth_planner.kernels.collision import trajectory_check
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.required_clearance import RequiredClearance
@@ -53,7 +54,7 @@ def is_remaining_free(
             begin,
             running.target_distance,
             FINENESS * RESOLUTION,
-            chain,
+            jit.address(chain),
             robot,
             scene.numbers,
             allowed_bars(arm, scene),
@@ -107,7 +108,7 @@ def is_place_free(q: Array, required: RequiredClearance, scene: Scene) -> bool:
         trajectory_check.is_place_free(
             q,
             ray,
-            chain,
+            jit.address(chain),
             robot,
             boxes,
             allowed_bars(arm, scene),

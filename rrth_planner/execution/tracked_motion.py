@@ -4,6 +4,7 @@
 
 from dataclasses import dataclass
 import functools
+from typing import Any
 
 import numpy as np
 from rrth_planner.execution.executing_motion import ExecutingMotion, LONGEST_LAG, phase_of
@@ -108,12 +109,12 @@ def track(
 
 def track_next(tracked: TrackedMotion, motion: ExecutingMotion) -> TrackedMotion:
     """Track a motion that continues the present one."""
-    return changed(_commanded(tracked, motion), previous=None, stopped=None)
+    return _commanded(tracked, motion, previous=None, stopped=None)
 
 
 def track_stop(tracked: TrackedMotion, stop: ExecutingMotion) -> TrackedMotion:
     """Track a stop along the path of the present motion."""
-    return changed(_commanded(tracked, stop), stopped=tracked.motion)
+    return _commanded(tracked, stop, stopped=tracked.motion)
 
 
 def track_stop_again(tracked: TrackedMotion, stop: ExecutingMotion) -> TrackedMotion:
@@ -219,11 +220,8 @@ def track_previous(tracked: TrackedMotion, reading: JointReading | None) -> Trac
     q, v = reading.positions, reading.velocities
     if tracked.stopped is not None and phase_of(q, v, before.trajectory) is None:
         return tracked
-    return changed(
-        _commanded(tracked, before),
-        previous=motion,
-        stopped=None,
-        is_latest=not tracked.is_latest,
+    return _commanded(
+        tracked, before, previous=motion, stopped=None, is_latest=not tracked.is_latest
     )
 
 
@@ -246,5 +244,5 @@ def missed_stop(
     return tracked, phase
 
 
-def _commanded(tracked: TrackedMotion, motion: ExecutingMotion) -> TrackedMotion:
-    return changed(tracked, motion=motion, command=motion, off_since=None)
+def _commanded(tracked: TrackedMotion, motion: ExecutingMotion, **others: Any) -> TrackedMotion:
+    return changed(tracked, motion=motion, command=motion, off_since=None, **others)

@@ -242,7 +242,11 @@ def _announce(function: Callable[..., Any]) -> None:
 
 
 def kernel(
-    signature: Any, is_inner: bool = False, is_inlined: bool = False, is_short: bool = False
+    signature: Any,
+    is_inner: bool = False,
+    is_inlined: bool = False,
+    is_short: bool = False,
+    is_exact: bool = False,
 ) -> Callable[[Callable[..., Any]], Any]:
     """
     Return a decorator that compiles a kernel for one signature, and keeps the result.
@@ -251,13 +255,14 @@ def kernel(
     is_inlined: it is also written out where it is called, for the few whose call costs as much as
     what they do; the compiler itself takes only the smallest. is_short: other threads wait while
     it runs, which takes less time than to get hold of the interpreter once more after it.
+    is_exact: each operation rounds by itself, as it does in numpy.
     """
     # No `nnan`: a NaN must fail every comparison, and so never be certified.
     options = {
         'nogil': not is_short,
         'error_model': 'numpy',
         'forceinline': is_inlined,
-        'fastmath': {'contract', 'arcp', 'nsz'},
+        'fastmath': set() if is_exact else {'contract', 'arcp', 'nsz'},
         'no_cfunc_wrapper': signature not in SEAMS,
         'no_cpython_wrapper': is_inner,
         # Rewrites fuse expressions of whole arrays and prune branches on constants; kernels need
@@ -369,6 +374,23 @@ def addresses(*seams: Any) -> Any:
     found = np.array([address(seam) for seam in seams], dtype=np.int64)
     found.setflags(write=False)
     return found
+
+
+def _fused(a: Any, b: Any, c: Any) -> Any:
+    return a * b + c
+
+
+def _fused_type(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
+    """Return the type of a fused multiplication, and how it is made."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.fma(*arguments)
+
+    return float64(float64, float64, float64), generate
+
+
+# a b + c within a kernel, rounded once.
+fused = _fused if config.DISABLE_JIT else intrinsic(_fused_type)
 
 
 def _from_address(seam: Any) -> Any:

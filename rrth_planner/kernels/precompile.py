@@ -23,6 +23,7 @@ SHARES = (
         'collision.trajectory_check',
     ),
     (
+        'trajectory.points',
         'trajectory.quintics',
         'trajectory.fast_stop',
         'search.shortcut',

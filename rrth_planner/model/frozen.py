@@ -4,6 +4,7 @@
 
 from dataclasses import fields
 import functools
+from operator import attrgetter
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
@@ -47,24 +48,30 @@ def _made(kind: type[Frozen], arguments: dict[str, Any]) -> Frozen:
 
 
 @functools.cache
-def _slots(kind: Any) -> tuple[tuple[str, Any, Any], ...]:
-    """Return name, reader and writer of each field of a frozen dataclass with slots."""
-    members = ((f.name, getattr(kind, f.name)) for f in fields(kind))
-    return tuple((name, slot.__get__, slot.__set__) for name, slot in members)
+def _slots(kind: Any) -> tuple[Any, dict[str, int], tuple[Any, ...]]:
+    """Return what reads all fields of a frozen dataclass, their places, and writers of each."""
+    names = [f.name for f in fields(kind)]
+    # Of a single name it would return the value alone.
+    read = attrgetter(*names, names[0])
+    places = {name: k for k, name in enumerate(names)}
+    return read, places, tuple(getattr(kind, name).__set__ for name in names)
 
 
 def changed(value: T, **others: Any) -> T:
     """
     Return a frozen dataclass, with slots, that differs in some fields.
 
-    In half the time of `dataclasses.replace`, since nothing is checked again: for values that
-    check nothing when they are made, and are made anew with every body.
+    In a third of the time of `dataclasses.replace`, since nothing is checked again: for values
+    that check nothing when they are made, and are made anew with every body.
     """
     kind: Any = type(value)
+    read, places, writers = _slots(kind)
+    values = list(read(value))
+    for name, other in others.items():
+        if name not in places:
+            raise TypeError(f'{kind.__name__} has no field {name}')
+        values[places[name]] = other
     made = object.__new__(type(value))
-    slots = _slots(kind)
-    for name, read, write in slots:
-        write(made, others.pop(name) if name in others else read(value))
-    if others:
-        raise TypeError(f'{type(value).__name__} has no field {", ".join(others)}')
+    for write, one in zip(writers, values, strict=False):
+        write(made, one)
     return made

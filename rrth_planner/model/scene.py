@@ -3,7 +3,7 @@
 """The wearer as boxes."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from rrth_planner.kernels.layout import MAX_BOXES, NUMBERS, ORTHOGONAL, ROTATION, SIZE
@@ -70,24 +70,36 @@ class Box(Frozen):
     def of_row(cls, name: str, row: Array) -> 'Box':
         """Return a box of numbers, (15,), that are known to be one and may not be changed."""
         box: Box = object.__new__(cls)
-        _fill(box, name, row)
+        _put(box, 'name', name)
+        _put(box, 'numbers', row)
         return box
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Array:
+            """Return a part of the numbers, of a box of which nobody has asked for it before."""
+            if name not in ('center', 'size', 'rotation'):
+                raise AttributeError(f'a box has no {name}')
+            _fill(self, self.name, self.numbers)
+            return getattr(self, name)
+
+
+_put = object.__setattr__
 
 
 def _fill(box: Box, name: str, row: Array) -> None:
     """Write the fields of a box, all of them parts of one array."""
-    put = object.__setattr__
-    put(box, 'name', name)
-    put(box, 'numbers', row)
-    put(box, 'center', row[:SIZE])
-    put(box, 'size', row[SIZE:ROTATION])
-    put(box, 'rotation', row[ROTATION:].reshape(3, 3))
+    _put(box, 'name', name)
+    _put(box, 'numbers', row)
+    _put(box, 'center', row[:SIZE])
+    _put(box, 'size', row[SIZE:ROTATION])
+    _put(box, 'rotation', row[ROTATION:].reshape(3, 3))
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
     """
-    The wearer: boxes in the base frame, and their `numbers` as an array, (n, 15).
+    The wearer: boxes in the base frame, their `names`, and `numbers` as an array, (n, 15).
 
     Raises
     ------
@@ -97,27 +109,44 @@ class Scene:
     """
 
     boxes: tuple[Box, ...]
+    names: tuple[str, ...] = field(init=False, repr=False, compare=False)
     numbers: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Validate and freeze the collection."""
         boxes = tuple(self.boxes)
         for box in boxes:
-            check_type(box, Box, 'boxes', SceneError)
+            if type(box) is not Box:
+                check_type(box, Box, 'boxes', SceneError)
         if len(boxes) > MAX_BOXES:
             raise SceneError(f'boxes: {len(boxes)}, expected at most {MAX_BOXES}')
-        object.__setattr__(self, 'boxes', boxes)
         numbers = np.array([box.numbers for box in boxes]).reshape(len(boxes), NUMBERS)
         numbers.setflags(write=False)
-        object.__setattr__(self, 'numbers', numbers)
+        _put(self, 'boxes', boxes)
+        _put(self, 'names', tuple([box.name for box in boxes]))
+        _put(self, 'numbers', numbers)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Be sent as names and one array, in a quarter of the time that the boxes take."""
-        return scene_of_bytes, (tuple(box.name for box in self.boxes), self.numbers.tobytes())
+        return scene_of_bytes, (self.names, self.numbers.tobytes())
+
+
+def scene_of_rows(names: tuple[str, ...], numbers: Array) -> Scene:
+    """
+    Return the scene of boxes of numbers, (n, 15), that are known to be boxes.
+
+    Nobody else may change these any more. Raise SceneError for more boxes than kernels take.
+    """
+    if len(names) > MAX_BOXES:
+        raise SceneError(f'boxes: {len(names)}, expected at most {MAX_BOXES}')
+    numbers.setflags(write=False)
+    scene: Scene = object.__new__(Scene)
+    _put(scene, 'boxes', tuple(map(Box.of_row, names, numbers)))
+    _put(scene, 'names', names)
+    _put(scene, 'numbers', numbers)
+    return scene
 
 
 def scene_of_bytes(names: tuple[str, ...], rows: bytes) -> Scene:
     """Return the scene that was sent in this way; it is not checked again."""
-    # An array over bytes is read-only.
-    numbers = np.frombuffer(rows).reshape(len(names), NUMBERS)
-    return Scene(tuple(map(Box.of_row, names, numbers)))
+    return scene_of_rows(names, np.frombuffer(rows).reshape(len(names), NUMBERS))

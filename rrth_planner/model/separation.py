@@ -199,7 +199,7 @@ class SeenBody(Frozen):
 
 def seen_body(scene: Scene, ages: float | Sequence[float], rules: SeparationRules) -> SeenBody:
     """Return a body seen some time ago, one age for all boxes or one each [s], >= 0."""
-    speeds = np.array([speed_bound(rules, box.name) for box in scene.boxes])
+    speeds = np.array([speed_bound(rules, name) for name in scene.names])
     return SeenBody(
         scene, np.broadcast_to(np.asarray(ages, dtype=np.float64), len(speeds)), speeds
     )

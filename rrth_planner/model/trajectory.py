@@ -2,13 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Geometry with time: quintic pieces, as a controller interpolates them, and states of motion."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 import functools
+import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from rrth_planner.model.arrays import Array, FARTHEST, float_array, frozen_array
+from rrth_planner.model.arrays import Array, FARTHEST, FLOAT, float_array, frozen_array
 from rrth_planner.model.errors import check_type, OptionsError, RrthError
 from rrth_planner.model.frozen import Frozen
 
@@ -83,6 +85,14 @@ class Trajectory:
 
     def __post_init__(self) -> None:
         """Validate and freeze."""
+        rows = self.positions, self.velocities, self.accelerations
+        if all(map(_is_plain, (self.times, *rows))) and _are_points(self.times, *rows):
+            # As most are, and seen at once.
+            for name, value in zip(_NAMES, (self.times, *rows), strict=True):
+                value = value.copy()
+                value.setflags(write=False)
+                object.__setattr__(self, name, value)
+            return
         times = frozen_array(self.times, (None,), 'times', 's', RrthError)
         if len(times) == 0 or times[0] != 0.0 or not (times[1:] > times[:-1]).all():
             raise RrthError('times: expected at least one, from 0, strictly increasing [s]')
@@ -103,6 +113,20 @@ class Trajectory:
         arrays = self.times, *self.states
         return _of_bytes, (len(self.times), b''.join(array.tobytes() for array in arrays))
 
+    @classmethod
+    def of_arrays(cls, times: Array, states: Array) -> 'Trajectory':
+        """
+        Return the trajectory of points, (n,) and (3, n, dof), that are known to be those of one.
+
+        Nobody else may hold the arrays.
+        """
+        times.setflags(write=False)
+        states.setflags(write=False)
+        trajectory: Trajectory = object.__new__(cls)
+        for name, values in zip(_NAMES, (times, *states), strict=True):
+            object.__setattr__(trajectory, name, values)
+        return trajectory
+
     @property
     def duration(self) -> float:
         """Time of the last point [s]."""
@@ -114,16 +138,34 @@ class Trajectory:
         return self.positions, self.velocities, self.accelerations
 
 
+_NAMES = 'times', 'positions', 'velocities', 'accelerations'
+
+
+def _is_plain(array: Any) -> bool:
+    if type(array) is not np.ndarray or array.dtype != FLOAT:
+        return False
+    flags = array.flags
+    return flags.c_contiguous and flags.aligned
+
+
+def _are_points(times: Array, p: Array, v: Array, a: Array) -> bool:
+    """Return whether arrays are seen at once to be the points of a motion."""
+    if times.ndim != 1 or p.ndim != 2 or not p.shape == v.shape == a.shape:
+        return False
+    if not 0 < len(times) == len(p) or times[0] != 0.0:
+        return False
+    # A sum of squares is finite where all numbers are, unless it overflows.
+    if not np.minimum.reduce(times[1:] - times[:-1], initial=np.inf) > 0.0:
+        return False
+    size, rest = math.sqrt(np.vdot(p, p)), float(np.vdot(v, v)) + float(np.vdot(a, a))
+    return size <= FARTHEST and math.isfinite(rest) and times[-1] < np.inf
+
+
 def _of_bytes(n: int, data: bytes) -> Trajectory:
     """Return the trajectory of n points that was sent in this way; it is not checked again."""
     # An array over bytes is read-only.
     numbers = np.frombuffer(data)
-    trajectory: Trajectory = object.__new__(Trajectory)
-    object.__setattr__(trajectory, 'times', numbers[:n])
-    states = numbers[n:].reshape(3, n, -1)
-    for name, values in zip(('positions', 'velocities', 'accelerations'), states, strict=True):
-        object.__setattr__(trajectory, name, values)
-    return trajectory
+    return Trajectory.of_arrays(numbers[:n], numbers[n:].reshape(3, n, -1))
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -227,26 +269,65 @@ def sample(trajectory: Trajectory, times: ArrayLike) -> tuple[Array, Array, Arra
     return q, v, a
 
 
-def part_of(trajectory: Trajectory, begin: float, end: float) -> Trajectory:
+def state_at(trajectory: Trajectory, time: float) -> Array:
+    """Return the state at one time [s], as `sample` does, (3, dof)."""
+    times = trajectory.times
+    n = len(times)
+    if n == 1:
+        held = np.zeros((3, trajectory.positions.shape[1]))
+        held[0] = trajectory.positions[0]
+        return held
+    i = int(times[1:-1].searchsorted(time, side='right'))
+    begin = float(times[i])
+    width = float(times[i + 1]) - begin
+    u = min(max((time - begin) / width, 0.0), 1.0)
+    state = _one_state(piece_coefficients(trajectory)[i], u, width, width * width)
+    if time < 0.0 or time > times[n - 1]:
+        state[1:] = 0.0
+    return state
+
+
+def motion_through(times: Array, states: Array) -> Trajectory:
+    """
+    Return the motion through points, without copies: nobody else may hold the arrays.
+
+    times (n,) [s]; states (3, n, dof). Raise RrthError as `Trajectory`.
+    """
+    if not _are_points(times, *states):
+        # It says what is wrong.
+        return Trajectory(times, *states)
+    return Trajectory.of_arrays(times, states)
+
+
+def part_of(
+    trajectory: Trajectory,
+    begin: float,
+    end: float,
+    curves_of: Callable[[Trajectory], Array] = piece_coefficients,
+    through: Callable[[Array, Array], Trajectory] = motion_through,
+) -> Trajectory:
     """
     Return the part of a trajectory between two times, shifted to begin at time 0.
 
     It is that trajectory to rounding: a part of a quintic is the quintic through its ends, and
     every point between the two times [s] stays. They are clipped to its own; where end <= begin,
-    the result is a single point.
+    the result is a single point. curves_of, through: `piece_coefficients` and `motion_through`, or
+    what has the same results sooner.
     """
     times = trajectory.times
     begin = min(max(begin, 0.0), trajectory.duration)
     end = min(max(end, 0.0), trajectory.duration)
     if end <= begin:
-        return Trajectory(np.zeros(1), *_state_by(trajectory, end, 0.0))
-    is_inside = (times > begin + NEAR_POINT) & (times < end - NEAR_POINT)
-    first, last = _state_by(trajectory, begin, NEAR_POINT), _state_by(trajectory, end, -NEAR_POINT)
-    inner = [row[is_inside] for row in trajectory.states]
-    return Trajectory(
-        np.concatenate([[0.0], times[is_inside] - begin, [end - begin]]),
-        *map(np.concatenate, zip(first, inner, last, strict=True)),
-    )
+        return through(np.zeros(1), _state_by(trajectory, end, 0.0, curves_of)[:, None])
+    i = int(times.searchsorted(begin + NEAR_POINT, side='right'))
+    n = max(0, int(times.searchsorted(end - NEAR_POINT)) - i)
+    points, states = np.empty(n + 2), np.empty((3, n + 2, trajectory.positions.shape[1]))
+    points[0], points[1:-1], points[-1] = 0.0, times[i : i + n] - begin, end - begin
+    states[:, 0] = _state_by(trajectory, begin, NEAR_POINT, curves_of)
+    states[:, -1] = _state_by(trajectory, end, -NEAR_POINT, curves_of)
+    for row, values in zip(states, trajectory.states, strict=True):
+        row[1:-1] = values[i : i + n]
+    return through(points, states)
 
 
 def cut_at(trajectory: Trajectory, times: Array) -> tuple[Trajectory, NDArray[np.int64]]:
@@ -275,21 +356,22 @@ def joined(before: Trajectory, after: Trajectory) -> Trajectory:
     return Trajectory(times, *(np.concatenate([one, other[1:]]) for one, other in pairs))
 
 
-def _state_by(trajectory: Trajectory, time: float, ahead: float) -> tuple[Array, Array, Array]:
+def _state_by(
+    trajectory: Trajectory, time: float, ahead: float, curves_of: Callable[[Trajectory], Array]
+) -> Array:
     """
-    Return the state at a time, each (1, dof), by the polynomial valid a little ahead [s].
+    Return the state at a time, (3, dof), by the polynomial valid a little ahead [s].
 
     At one of its points the state is that of the point, to the bit.
     """
     times = trajectory.times
     i = int(times.searchsorted(time))
     if times[i] == time:
-        q, v, a = (row[i : i + 1] for row in trajectory.states)
-        return q, v, a
-    i = int(np.searchsorted(times[1:-1], time + ahead, side='right'))
-    width = times[i + 1] - times[i]
-    u = np.full((1, 1), (time - times[i]) / width)
-    return _state(piece_coefficients(trajectory)[i : i + 1], u, width)
+        return np.array([row[i] for row in trajectory.states])
+    i = int(times[1:-1].searchsorted(time + ahead, side='right'))
+    width = float(times[i + 1] - times[i])
+    u = (time - float(times[i])) / width
+    return _one_state(curves_of(trajectory)[i], u, width, width**2)
 
 
 def _locate(trajectory: Trajectory, times: Array) -> tuple[NDArray[np.intp], Array, Array]:
@@ -299,6 +381,20 @@ def _locate(trajectory: Trajectory, times: Array) -> tuple[NDArray[np.intp], Arr
     width = grid[i + 1] - grid[i]
     u = (times - grid[i]) / width
     return i, np.minimum(np.maximum(u, 0.0), 1.0)[:, None], width[:, None]
+
+
+def _one_state(c: Array, u: float, width: float, square: float) -> Array:
+    """Return the state on a piece, (6, dof) -> (3, dof): as `_state`, for one time sooner."""
+    columns = zip(*c.tolist(), strict=True)
+    states = [
+        (
+            ((((c5 * u + c4) * u + c3) * u + c2) * u + c1) * u + c0,
+            ((((5 * c5 * u + 4 * c4) * u + 3 * c3) * u + 2 * c2) * u + c1) / width,
+            (((20 * c5 * u + 12 * c4) * u + 6 * c3) * u + 2 * c2) / square,
+        )
+        for c0, c1, c2, c3, c4, c5 in columns
+    ]
+    return np.array(list(zip(*states, strict=True)))
 
 
 def _state(c: Array, u: Array, width: Array | float) -> tuple[Array, Array, Array]:

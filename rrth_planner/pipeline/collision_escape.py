@@ -4,6 +4,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+import math
 
 import numpy as np
 from rrth_planner.collision.penetration import (
@@ -234,20 +235,11 @@ def _scattered(
     """Yield where the arm is first free along each joint and in random directions."""
     dof = len(q_start)
     random = rng.standard_normal((N_DIRECTIONS, dof))
+    shares = np.arange(SPACING, longest, SPACING)
     for direction in np.concatenate([np.eye(dof), -np.eye(dof), random]):
         if should_stop():
             break
         u = direction / np.linalg.norm(direction)
-        for far in np.arange(SPACING, longest, SPACING).tolist():
-            if not roomy.is_in_bounds(q_start + far * u):
-                break
-            if roomy.is_valid(q_start + far * u):
-                near = far - SPACING
-                for _ in range(HALVINGS):
-                    middle = 0.5 * (near + far)
-                    if roomy.is_valid(q_start + middle * u):
-                        far = middle
-                    else:
-                        near = middle
-                yield q_start + far * u
-                break
+        far = roomy.first_free(q_start, u, shares, HALVINGS)
+        if not math.isnan(far):
+            yield q_start + far * u

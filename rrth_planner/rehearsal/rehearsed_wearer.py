@@ -11,13 +11,15 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import RecordError, SceneError
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.rehearsal.world import BEGIN
-from rrth_planner.wearer.body_boxes import body_boxes
-from rrth_planner.wearer.recorded_person import posture_at, RecordedPerson
+from rrth_planner.wearer.body_boxes import rows_of_postures
+from rrth_planner.wearer.recorded_person import postures_at, RecordedPerson
 from rrth_planner.wearer.skeleton import Skeleton
 
 # A recorded person is seen, and judged, at instants so far apart: a multiple of them is the period
 # of trackers with 30, 60 and 120 frames a second, and that of a controller with 200 Hz [s].
 INSTANT = 1 / 600
+# His boxes are found at so many of them at once.
+BLOCK = 120
 # A hand that goes for the arm looks so often where that is [s].
 HAND_PERIOD = 0.02
 # How large it is [m].
@@ -55,33 +57,32 @@ class RecordedWearer:
                 f'begin: {begin:g}, expected less than the recording lasts, '
                 f'{person.duration:.3f} [s]'
             )
-        seen = self._boxes(0)
-        if not seen:
+        is_seen = np.isfinite(self._found(0, 1)[0].sum(axis=1))
+        if not is_seen.any():
             raise RecordError(f'no part of the person is seen {begin:g} s after its beginning')
-        self.names = tuple(part.name for part in skeleton.parts if part.name in seen)
+        self._parts = np.flatnonzero(is_seen)
+        self.names = tuple(skeleton.parts[k].name for k in self._parts)
         self._rows = np.full((self._n + 1, len(self.names), 15), np.nan)
-        self._is_known = [False] * (self._n + 1)
+        self._is_known = [False] * (self._n // BLOCK + 1)
 
     def rows_at(self, time: float) -> Array:
         """Return his boxes at the instant next to a time [s], (m, 15); NaN: a lost part."""
         k = max(0, round((time - BEGIN) / INSTANT)) % (2 * self._n)
         k = self._n - abs(k - self._n)
-        if not self._is_known[k]:
-            seen = self._boxes(k)
-            for j, name in enumerate(self.names):
-                if name in seen:
-                    self._rows[k, j] = seen[name]
-            self._is_known[k] = True
+        block = k // BLOCK
+        if not self._is_known[block]:
+            first = block * BLOCK
+            found = self._found(first, min(first + BLOCK, self._n + 1))
+            self._rows[first : first + len(found)] = found[:, self._parts]
+            self._is_known[block] = True
         rows: Array = self._rows[k]
         return rows
 
-    def _boxes(self, k: int) -> dict[str, Array]:
-        time = self._first + k * INSTANT * self._rate
-        try:
-            scene, _ = body_boxes(self._skeleton, posture_at(self._person, time))
-        except SceneError:
-            return {}
-        return {box.name: box.numbers for box in scene.boxes}
+    def _found(self, first: int, end: int) -> Array:
+        """Return the boxes of all parts at some instants, (end - first, n_parts, 15)."""
+        times = self._first + np.arange(first, end) * INSTANT * self._rate
+        postures = postures_at(self._person, times)
+        return rows_of_postures(self._skeleton, self._person.names, *postures)
 
 
 class InterceptingWearer:

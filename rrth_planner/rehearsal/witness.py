@@ -8,7 +8,6 @@ It knows nothing of the proof, and has the wearer where he is, also where no tra
 
 from collections import Counter
 from dataclasses import dataclass, field
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -140,22 +139,23 @@ class Witness:
             self._judge(CHUNK)
 
     def _judge(self, n: int) -> None:
-        seen, self._seen = _with_middles(self._seen[:n]), self._seen[n:]
+        seen, self._seen = self._seen[:n], self._seen[n:]
         if not seen:
             return
         arm, names, found = self._world.rules.required.arm, self._truth.names, self.testimony
-        q, v = np.array([one[1] for one in seen]), np.array([one[2] for one in seen])
-        times = np.array([one[0] for one in seen])
+        # Between two cycles the arm moves along the line, and is judged in the middle, too.
+        times, q, v = (_with_middles(np.array([one[k] for one in seen])) for k in range(3))
         rows = np.nan_to_num(np.array([self._truth.rows_at(time) for time in times]), nan=1e3)
         speed = self._contact_speed
         distances = distances_to(arm, q, v, names, rows, speed, WITHIN)
         classes = classes_of(distances)
         for i, bar, box in np.argwhere(classes != ''):
             self._meet(
-                *(seen[i][0], seen[i][3], self._n_judged + int(i), int(bar), int(box)),
+                *(float(times[i]), seen[i // 2].sights, self._n_judged + int(i)),
+                *(int(bar), int(box)),
                 *(str(classes[i, bar, box]), float(distances.speeds[i, bar, box]), rows[i, box]),
             )
-        self._n_judged += len(seen)
+        self._n_judged += len(times)
         for key, contact in tuple(self._open.items()):
             if contact.last < self._n_judged - 1:
                 self._end(key)
@@ -223,17 +223,10 @@ class Witness:
         self.testimony.contacts[contact.word, contact.is_kept] += 1
 
 
-def _with_middles(seen: list[_Instant]) -> list[_Instant]:
-    """Return instants, and one between each two: there the arm moves along the line."""
-    found = seen[:1]
-    for before, after in pairwise(seen):
-        middle = _Instant(
-            0.5 * (before.time + after.time),
-            0.5 * (before.q + after.q),
-            0.5 * (before.v + after.v),
-            before.sights,
-        )
-        found += [middle, after]
+def _with_middles(values: Array) -> Array:
+    """Return values, and the mean of each two neighbours between them, (n, ...) -> (2n-1, ...)."""
+    found = np.empty((2 * len(values) - 1, *values.shape[1:]))
+    found[::2], found[1::2] = values, 0.5 * (values[:-1] + values[1:])
     return found
 
 

@@ -21,6 +21,7 @@ from rrth_planner.execution.monitor import Monitor
 from rrth_planner.execution.recent_wearer import RecentWearer
 from rrth_planner.execution.watch import MonitorRules
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.curves import state_at
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.rehearsal.timeline import Timeline
 from rrth_planner.simulation.lagging_arm import LaggingArm
@@ -29,6 +30,7 @@ from rrth_planner.simulation.trajectory_controller import (
     ControllerRules,
     ControllerState,
     DEFAULT_RULES,
+    points_of,
     TimedPoints,
 )
 
@@ -128,7 +130,7 @@ class World:
         self.rules, self.wearer, self.wire = rules, wearer, wire
         self.rng = np.random.default_rng(seed)
         self.timeline = Timeline(begin)
-        self.arm = LaggingArm(q, controller_period, lag, controller, begin)
+        self.arm = LaggingArm(q, controller_period, lag, controller, begin, state_at)
         self.monitor = Monitor(
             rules, self.moment, self.look, self.send, deciding or self._deciding, flight
         )
@@ -245,7 +247,7 @@ class World:
         before, due = controller.command, self.arm.time + controller.period
         setpoint = arm.step()
         if controller.command is not before:
-            self.on_join(arm.time, commanded_state(before, due), setpoint)
+            self.on_join(arm.time, commanded_state(before, due, state_at), setpoint)
         self.on_setpoint(arm.time, setpoint)
 
     def joints_came(self, reading: JointReading) -> None:
@@ -329,13 +331,7 @@ class World:
             self.on_unsent(command)
             raise ConnectionError('no middleware')
         self.on_command(command)
-        motion = command.motion.trajectory
-        points = TimedPoints(
-            times=motion.times,
-            positions=motion.positions,
-            velocities=motion.velocities,
-            accelerations=motion.accelerations,
-        )
+        points = points_of(command.motion.trajectory)
         # A commitment is published so long after the body for which it was found.
         sent = now + (self.took if command.within < math.inf else 0.0)
         arrives = max(sent + float(self.rng.uniform(*self.wire.transport)), self._last_arrival)

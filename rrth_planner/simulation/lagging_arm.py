@@ -3,10 +3,12 @@
 """An arm in virtual time that does what its controller commands, a constant time later."""
 
 from collections import deque
+from collections.abc import Callable
 
 import numpy as np
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import OptionsError
+from rrth_planner.model.trajectory import state_at, Trajectory
 from rrth_planner.simulation.trajectory_controller import (
     ControllerRules,
     ControllerState,
@@ -30,17 +32,24 @@ class LaggingArm:
         lag_time: float = 0.0,
         rules: ControllerRules = DEFAULT_RULES,
         time: float = 0.0,
+        state_of: Callable[[Trajectory, float], Array] = state_at,
     ) -> None:
-        """Place the arm at rest at q, (dof,) [rad], before the cycle at a time [s]."""
+        """
+        Place the arm at rest at q, (dof,) [rad], before the cycle at a time [s].
+
+        state_of: as for `commanded_state`.
+        """
         if not period > 0.0:
             raise OptionsError(f'period: {period}, expected > 0 [s]')
         if not lag_time >= 0.0:
             raise OptionsError(f'lag_time: {lag_time}, expected >= 0 [s]')
-        self.controller = TrajectoryController(q, period, rules)
+        self.controller = TrajectoryController(q, period, rules, state_of)
         self.lag_time, self.time = lag_time, time
         self._begin, self._n_steps = time, 0
         # Times [s], and positions and velocities that are due then, (2, dof).
         rest = np.array([q, np.zeros(len(q))])
+        self._unknown = np.full(len(q), np.nan)
+        self._unknown.setflags(write=False)
         n_kept = 4 + int(lag_time / period)
         self._setpoints: deque[tuple[float, Array]] = deque([(time, rest)], maxlen=n_kept)
 
@@ -75,4 +84,4 @@ class LaggingArm:
         if k + 1 < len(setpoints) and then > due:
             share = (then - due) / (setpoints[k + 1][0] - due)
             q, v = (1.0 - share) * setpoints[k][1] + share * setpoints[k + 1][1]
-        return ControllerState(positions=q, velocities=v, accelerations=np.full_like(q, np.nan))
+        return ControllerState(positions=q, velocities=v, accelerations=self._unknown)

@@ -11,6 +11,7 @@ joint follows the polynomial of the lowest degree that fits what both have: a li
 quintic. After the last point that one holds.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 import functools
@@ -18,7 +19,7 @@ import functools
 import numpy as np
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import MessageError, OptionsError
-from rrth_planner.model.trajectory import sample, Trajectory
+from rrth_planner.model.trajectory import motion_through, state_at, Trajectory
 
 
 class ControllerVersion(Enum):
@@ -66,6 +67,8 @@ class TimedPoints:
         [rad or m].
     velocities, accelerations : ndarray, shape (n, dof)
         Rows of NaN where a point has none [rad/s, rad/s^2].
+    motion : Trajectory or None
+        The motion whose points they are, where they are those of one.
 
     Raises
     ------
@@ -78,9 +81,14 @@ class TimedPoints:
     positions: Array
     velocities: Array
     accelerations: Array
+    motion: Trajectory | None = None
 
     def __post_init__(self) -> None:
         """Validate and freeze times and positions."""
+        motion = self.motion
+        if motion is not None and self.times is motion.times:
+            # They were checked, and are frozen.
+            return
         times = frozen_array(self.times, (None,), 'times', 's', MessageError)
         if not len(times) or times[0] < 0.0 or not (np.diff(times) > 0.0).all():
             raise MessageError('times: expected at least one, from >= 0, strictly increasing [s]')
@@ -216,22 +224,35 @@ def ramp_to_rest(present: ControllerState, deceleration: Array, now: float) -> C
     return Command(points=points, start_time=now, is_holding=True)
 
 
-def commanded_state(command: Command, time: float) -> ControllerState:
-    """Return what is commanded at a time [s], (dof,) each."""
+def points_of(motion: Trajectory) -> TimedPoints:
+    """Return the points of a motion."""
+    q, v, a = motion.states
+    return TimedPoints(
+        times=motion.times, positions=q, velocities=v, accelerations=a, motion=motion
+    )
+
+
+def commanded_state(
+    command: Command, time: float, state_of: Callable[[Trajectory, float], Array] = state_at
+) -> ControllerState:
+    """
+    Return what is commanded at a time [s], (dof,) each.
+
+    state_of: `trajectory.state_at`, or what has the same results sooner.
+    """
     points = command.points
     since = time - command.start_time
-    i = int(np.searchsorted(points.times, since, side='right')) - 1
+    i = int(points.times.searchsorted(since, side='right')) - 1
     if i < 0 and command.before is not None:
         begin = command.begin - command.start_time
         piece = _lead(command)
         return _state(piece, min(max(since - begin, 0.0), piece.duration))
     if 0 <= i < len(points.times) - 1:
+        if points.motion is not None:
+            q, v, a = state_of(points.motion, since)
+            return ControllerState(positions=q, velocities=v, accelerations=a)
         return _state(_piece(points, i), since - points.times[i])
-    last = (points.velocities[i], points.accelerations[i])
-    velocity, acceleration = (np.where(np.isnan(row), 0.0, row) for row in last)
-    return ControllerState(
-        positions=points.positions[i], velocities=velocity, accelerations=acceleration
-    )
+    return _state_of(points, i)
 
 
 def is_moving(command: Command, time: float) -> bool:
@@ -267,9 +288,22 @@ def deviation(
     return i, f'{abs(error[i]):.4g} from what is commanded, expected {what} {allowed[i]:g} [rad]'
 
 
+# Held cycle after cycle.
+@functools.lru_cache(maxsize=8)
+def _state_of(points: TimedPoints, i: int) -> ControllerState:
+    """Return the state of a point, at rest in what it does not say."""
+    last = (points.velocities[i], points.accelerations[i])
+    velocity, acceleration = (np.where(np.isnan(row), 0.0, row) for row in last)
+    for array in (velocity, acceleration):
+        array.setflags(write=False)
+    return ControllerState(
+        positions=points.positions[i], velocities=velocity, accelerations=acceleration
+    )
+
+
 def _state(piece: Trajectory, time: float) -> ControllerState:
-    q, v, a = sample(piece, [time])
-    return ControllerState(positions=q[0], velocities=v[0], accelerations=a[0])
+    q, v, a = state_at(piece, time)
+    return ControllerState(positions=q, velocities=v, accelerations=a)
 
 
 # A stretch of a motion comes with every body: of the one before it nothing is asked any more.
@@ -304,6 +338,9 @@ def piece_between(
     Where one of them has no velocities (NaN), a line; where one has no accelerations, the cubic;
     else the quintic, of which those are special cases.
     """
+    times, states = np.array([0.0, duration]), np.array([first, last]).swapaxes(0, 1)
+    if np.isfinite(states).all():
+        return motion_through(times, np.ascontiguousarray(states))
     (p, v, a), (p_end, v_end, a_end) = first, last
     step = p_end - p
     if np.isnan(v).any() or np.isnan(v_end).any():
@@ -314,7 +351,7 @@ def piece_between(
         a = (6.0 * step - (4.0 * v + 2.0 * v_end) * duration) / duration**2
         a_end = (-6.0 * step + (2.0 * v + 4.0 * v_end) * duration) / duration**2
     return Trajectory(
-        times=np.array([0.0, duration]),
+        times=times,
         positions=np.array([p, p_end]),
         velocities=np.array([v, v_end]),
         accelerations=np.array([a, a_end]),
@@ -352,13 +389,20 @@ DEFAULT_RULES = ControllerRules()
 class TrajectoryController:
     """The controller of an arm: messages come at any time, `update` is called once a period."""
 
-    def __init__(self, q: Array, period: float, rules: ControllerRules = DEFAULT_RULES) -> None:
+    def __init__(
+        self,
+        q: Array,
+        period: float,
+        rules: ControllerRules = DEFAULT_RULES,
+        state_of: Callable[[Trajectory, float], Array] = state_at,
+    ) -> None:
         """
         Activate it: it holds a position, (dof,) [rad or m], and is updated every `period` [s].
 
-        That is the last command where there was one, the default, or what is measured.
+        That is the last command where there was one, the default, or what is measured. state_of:
+        as for `commanded_state`.
         """
-        self.period, self.rules = period, rules
+        self.period, self.rules, self._state_of = period, rules, state_of
         self.command = hold(np.array(q, dtype=np.float64))
         # Why the last cycle gave its trajectory up, if it did: which joint, and a sentence.
         self.given_up: tuple[int, str] | None = None
@@ -383,11 +427,12 @@ class TrajectoryController:
         self._take_message(now, measured)
         self.given_up = None
         if self.rules.tolerances is not None:
-            error = commanded_state(self.command, now).positions - measured.positions
+            commanded = commanded_state(self.command, now, self._state_of)
+            error = commanded.positions - measured.positions
             self.given_up = deviation(self.command, self.rules.tolerances, now, error)
             if self.given_up is not None:
                 self.cancel(now, measured)
-        setpoint = commanded_state(self.command, now + self.period)
+        setpoint = commanded_state(self.command, now + self.period, self._state_of)
         self._last = setpoint, now
         return setpoint
 

@@ -5,7 +5,8 @@
 import numpy as np
 from rrth_planner.kernels.trajectory.fast_stop import write_fast_stop
 from rrth_planner.kernels.trajectory.stop_trajectory import SPACINGS
-from rrth_planner.model.trajectory import MotionLimits, piece_coefficients, Trajectory
+from rrth_planner.model.curves import curves_of, motion_through
+from rrth_planner.model.trajectory import MotionLimits, Trajectory
 
 # Assumed latency of the stop message to the controller [s].
 LATENCY = 0.01
@@ -26,11 +27,11 @@ def fast_stop(
     less than 1 %; jerks only up to rounding, which in pieces below 0.1 ms exceeds that.
     """
     time = min(max(time, 0.0), trajectory.duration)
-    curves, dof = piece_coefficients(trajectory), trajectory.positions.shape[1]
+    curves, dof = curves_of(trajectory), trajectory.positions.shape[1]
     if time == trajectory.duration:
         still = np.zeros((1, dof))
         return Trajectory(np.zeros(1), trajectory.positions[-1:], still, still)
     most = len(trajectory.times) + 8 + int(trajectory.duration / SPACINGS[-1])
     times, states = np.empty(most), np.empty((3, most, dof))
     n = write_fast_stop(curves, trajectory.times, time, lead, *limits.rows, times, states)
-    return Trajectory(times[:n], *states[:, :n])
+    return motion_through(times[:n].copy(), states[:, :n].copy())

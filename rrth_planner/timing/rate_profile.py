@@ -16,8 +16,9 @@ from rrth_planner.kernels.trajectory.rate_profile import (
     write_scaled,
 )
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.curves import curves_of, motion_through
 from rrth_planner.model.frozen import Frozen
-from rrth_planner.model.trajectory import MotionLimits, piece_coefficients, Trajectory
+from rrth_planner.model.trajectory import MotionLimits, Trajectory
 
 # Derivatives of a rate below that are not worth a change [1/s]: it would end within 0.2 ms, in
 # which rounding is a jerk.
@@ -80,7 +81,7 @@ def steered(
     if abs(target - state[1]) < SAME_RATE and abs(state[2]) < NO_SLOPE:
         return steady(float(state[0]), float(state[1]))
     phases = np.empty((3, 5))
-    curves = piece_coefficients(motion)
+    curves = curves_of(motion)
     if not steer(curves, motion.times, state, target, *limits.rows, phases):
         return None
     return RateProfile(phases)
@@ -93,8 +94,8 @@ def scaled(motion: Trajectory, profile: RateProfile) -> Trajectory:
     Its points are on the path of the motion, no further than 10 ms apart while the rate changes. A
     profile that ends at rate 0 ends where it comes to rest on the way.
     """
-    curves, dof = piece_coefficients(motion), motion.positions.shape[1]
+    curves, dof = curves_of(motion), motion.positions.shape[1]
     most = len(motion.times) + 8 + int(profile.change_time / SPACING)
     times, states = np.empty(most), np.empty((3, most, dof))
     n = write_scaled(curves, motion.times, profile.phases, times, states)
-    return Trajectory(times[:n], *states[:, :n])
+    return motion_through(times[:n].copy(), states[:, :n].copy())

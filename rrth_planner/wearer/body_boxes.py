@@ -2,16 +2,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """Boxes round a wearer of whom a tracker sees points or frames."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import SceneError, shown
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.wearer.joint_positions import FARTHEST_POINT, Indices, joint_positions, padded
-from rrth_planner.wearer.plausible_posture import plausible_posture
+from rrth_planner.wearer.joint_positions import (
+    FARTHEST_POINT,
+    Indices,
+    joint_positions,
+    joints_of,
+    padded,
+)
+from rrth_planner.wearer.plausible_posture import are_plausible, plausible_posture
 from rrth_planner.wearer.posture import Posture
 from rrth_planner.wearer.skeleton import (
     AXES,
@@ -91,11 +98,7 @@ def boxes_of_plausible(skeleton: Skeleton, posture: Posture) -> tuple[Scene, tup
     """Return the same as `body_boxes` of a posture that was judged before, and filtered since."""
     layout, joints = _layout(skeleton, posture.names), joint_positions(skeleton, posture)
     rotation, origin = _base(skeleton, layout, joints, posture)
-    in_base = np.empty((len(joints) + 4, 3))
-    np.matmul(joints - origin, rotation, out=in_base[:-4])
-    in_base[-4] = 0.0
-    in_base[-3:] = np.eye(3)
-    rows = _rows(layout, in_base)
+    rows = _rows(layout, _in_base(joints, rotation, origin))
     is_seen = np.isfinite(rows.sum(axis=1)).tolist()
     rows.setflags(write=False)
     names = [part.name for part in skeleton.parts]
@@ -104,6 +107,87 @@ def boxes_of_plausible(skeleton: Skeleton, posture: Posture) -> tuple[Scene, tup
     )
     missing = tuple(name for name, seen in zip(names, is_seen, strict=True) if not seen)
     return Scene(boxes), missing
+
+
+def rows_of_postures(
+    skeleton: Skeleton, names: tuple[str, ...], positions: Array, rotations: Array | None
+) -> Array:
+    """
+    Return the numbers of the boxes of many postures, found together, (m, n_parts, 15).
+
+    As `body_boxes`, to the bit: a box for each part of the skeleton, NaN where that is lost, all
+    of them where it is no person. positions (m, n, 3), rotations (m, n, 3, 3) of the points with
+    these names.
+    """
+    layout, joints = _layout(skeleton, names), joints_of(skeleton, names, positions, rotations)
+    m, n_parts = len(positions), len(skeleton.parts)
+    in_base = np.full((m, joints.shape[1] + 4, 3), np.nan)
+    believed = are_plausible(skeleton, names, positions, rotations)
+    others: dict[int, Array] = {}
+    for i in range(m):
+        turned = None if rotations is None else rotations[i]
+        posture = Posture(names=names, positions=positions[i], rotations=turned)
+        try:
+            if believed[i]:
+                rotation, origin = _base(skeleton, layout, joints[i], posture)
+                in_base[i] = _in_base(joints[i], rotation, origin)
+            else:
+                others[i] = _found_rows(skeleton, posture)
+        except SceneError:
+            pass
+    rows = _rows(_repeated(layout, m, in_base.shape[1]), in_base.reshape(-1, 3))
+    rows[~np.isfinite(rows.sum(axis=1))] = np.nan
+    rows = rows.reshape(m, n_parts, -1)
+    for i, found in others.items():
+        rows[i] = found
+    return rows
+
+
+def _found_rows(skeleton: Skeleton, posture: Posture) -> Array:
+    """Return the numbers of the boxes of one posture, (n_parts, 15), NaN where a part is lost."""
+    rows = np.full((len(skeleton.parts), ROTATION.stop), np.nan)
+    found = {box.name: box.numbers for box in body_boxes(skeleton, posture)[0].boxes}
+    for k, part in enumerate(skeleton.parts):
+        if part.name in found:
+            rows[k] = found[part.name]
+    return rows
+
+
+def _in_base(joints: Array, rotation: Array, origin: Array) -> Array:
+    """Return joints in the base frame, its origin and a point 1 m along each of its axes."""
+    in_base = np.empty((len(joints) + 4, 3))
+    np.matmul(joints - origin, rotation, out=in_base[:-4])
+    in_base[-4] = 0.0
+    in_base[-3:] = np.eye(3)
+    return in_base
+
+
+# Of one skeleton, for the last block of a recording, too.
+@lru_cache(maxsize=8)
+def _repeated(layout: _Layout, m: int, n_points: int) -> _Layout:
+    """Return a layout for the points of many postures, one after the other, n_points each."""
+    n_parts = len(layout.signs)
+    points, rows = n_points * np.arange(m), 3 * n_parts * np.arange(m)
+
+    def shifted(indices: Indices, by: Indices) -> Indices:
+        places = indices + by.reshape(-1, *(1,) * indices.ndim)
+        return places.reshape(-1, *indices.shape[1:])
+
+    def again(values: Any) -> Any:
+        return np.tile(values, (m, *(1,) * (values.ndim - 1)))
+
+    return replace(
+        layout,
+        part_joints=shifted(layout.part_joints, points),
+        ends=shifted(layout.ends, points),
+        is_limb=again(layout.is_limb),
+        rests=again(layout.rests),
+        rest_sides=again(layout.rest_sides),
+        order=shifted(layout.order, rows),
+        signs=again(layout.signs),
+        margins=again(layout.margins),
+        reaches=again(layout.reaches),
+    )
 
 
 def base_pose(skeleton: Skeleton, posture: Posture) -> Array:

@@ -30,19 +30,30 @@ class _Layout:
 
 def joint_positions(skeleton: Skeleton, posture: Posture) -> Array:
     """Return where the joints are in the frame of the tracker, (n_joints, 3) [m], NaN: lost."""
-    layout = _layout(skeleton, posture.names)
-    points = np.empty((len(posture.names) + 1, 3))
-    points[:-1] = posture.positions
-    points[-1] = np.nan
+    return joints_of(skeleton, posture.names, posture.positions, posture.rotations)
+
+
+def joints_of(
+    skeleton: Skeleton, names: tuple[str, ...], positions: Array, rotations: Array | None
+) -> Array:
+    """
+    Return the same of one posture, or of many at once, (..., n_joints, 3).
+
+    positions (..., n, 3) and rotations (..., n, 3, 3) of the points with these names.
+    """
+    layout = _layout(skeleton, names)
+    points = np.empty((*positions.shape[:-2], len(names) + 1, 3))
+    points[..., :-1, :] = positions
+    points[..., -1, :] = np.nan
     points[~(np.abs(points) <= FARTHEST_POINT)] = np.nan
-    joints: Array = (points[layout.points] * layout.weights).sum(axis=1)
+    joints: Array = (points[..., layout.points, :] * layout.weights).sum(axis=-2)
     if layout.offset_joints.size:
-        if posture.rotations is None or not posture.names:
-            joints[layout.offset_joints] = np.nan
+        if rotations is None or not names:
+            joints[..., layout.offset_joints, :] = np.nan
         else:
-            turned = posture.rotations[layout.offset_points] @ layout.offsets
+            turned = rotations[..., layout.offset_points, :, :] @ layout.offsets
             turned[~(np.abs(turned) <= LONGEST * 2)] = np.nan
-            joints[layout.offset_joints] += turned[:, :, 0]
+            joints[..., layout.offset_joints, :] += turned[..., 0]
     return joints
 
 

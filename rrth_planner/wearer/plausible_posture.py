@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import SceneError
-from rrth_planner.wearer.joint_positions import FARTHEST_POINT, Indices, joint_positions
+from rrth_planner.wearer.joint_positions import FARTHEST_POINT, Indices, joints_of
 from rrth_planner.wearer.posture import Posture
 from rrth_planner.wearer.skeleton import BASE, Bone, FrameBase, Skeleton
 
@@ -90,23 +90,60 @@ def plausible_posture(skeleton: Skeleton, posture: Posture) -> PlausiblePosture:
     """
     layout = _layout(skeleton, posture.names)
     joints = _joints(skeleton, posture)
-    positions = posture.positions[layout.used]
-    spans = joints[layout.ends[:, 1]] - joints[layout.ends[:, 0]]
-    lengths = np.sqrt(np.einsum('ij,ij->i', spans, spans))
-    reach = joints[layout.spans[:, 1]] - joints[layout.spans[:, 0]]
-    # What is lost compares as neither.
-    if not (
-        (np.abs(positions) > FARTHEST_POINT).any()
-        or (positions == 0.0).all(axis=1).any()
-        or (lengths < layout.shortest).any()
-        or (lengths > layout.longest).any()
-        or (lengths == 0.0).any()
-        or (np.einsum('ij,ij->i', reach, reach) > layout.longest_spans**2).any()
-        or _is_other_size(skeleton, layout, lengths)
-        or any(cosine < BACKWARD for cosine in _facing(skeleton, layout, joints, posture).values())
+    if _are_possible(skeleton, layout, joints, posture.positions) and _is_facing(
+        skeleton, layout, joints, posture
     ):
         return PlausiblePosture(posture)
     return _judged(skeleton, layout, posture)
+
+
+def are_plausible(
+    skeleton: Skeleton, names: tuple[str, ...], positions: Array, rotations: Array | None
+) -> NDArray[np.bool_]:
+    """
+    Return which of many postures are believed as they are, by `plausible_posture`, (m,).
+
+    positions (m, n, 3), rotations (m, n, 3, 3) of the points with these names.
+    """
+    layout = _layout(skeleton, names)
+    joints = _joints_with_base(skeleton, names, positions, rotations)
+    found = _are_possible(skeleton, layout, joints, positions)
+    for i in np.flatnonzero(found).tolist():
+        posture = Posture(
+            names=names,
+            positions=positions[i],
+            rotations=None if rotations is None else rotations[i],
+        )
+        found[i] = _is_facing(skeleton, layout, joints[i], posture)
+    return found
+
+
+def _are_possible(
+    skeleton: Skeleton, layout: _Layout, joints: Array, positions: Array
+) -> NDArray[np.bool_]:
+    """
+    Return whether all points and bones of one posture, or of many, are those of a person, (...).
+
+    joints (..., n_joints + 1, 3), positions (..., n, 3).
+    """
+    positions = positions[..., layout.used, :]
+    spans = joints[..., layout.ends[:, 1], :] - joints[..., layout.ends[:, 0], :]
+    lengths = np.sqrt(np.einsum('...j,...j->...', spans, spans))
+    reach = joints[..., layout.spans[:, 1], :] - joints[..., layout.spans[:, 0], :]
+    # What is lost compares as neither.
+    is_doubted = (np.abs(positions) > FARTHEST_POINT).any(axis=(-2, -1))
+    is_doubted |= (positions == 0.0).all(axis=-1).any(axis=-1)
+    is_wrong = (lengths < layout.shortest) | (lengths > layout.longest) | (lengths == 0.0)
+    is_doubted |= is_wrong.any(axis=-1)
+    is_far = np.einsum('...j,...j->...', reach, reach) > layout.longest_spans**2
+    is_doubted |= is_far.any(axis=-1)
+    return np.asarray(~(is_doubted | _is_other_size(skeleton, layout, lengths)))
+
+
+def _is_facing(skeleton: Skeleton, layout: _Layout, joints: Array, posture: Posture) -> bool:
+    """Return whether nothing points backward that points forward of a person."""
+    cosines = _facing(skeleton, layout, joints, posture).values()
+    return not any(cosine < BACKWARD for cosine in cosines)
 
 
 def _judged(skeleton: Skeleton, layout: _Layout, posture: Posture) -> PlausiblePosture:
@@ -118,7 +155,7 @@ def _judged(skeleton: Skeleton, layout: _Layout, posture: Posture) -> PlausibleP
     lengths = _lengths(layout, _joints(skeleton, posture))
     is_wrong = (lengths < layout.shortest) | (lengths > layout.longest)
     if _is_other_size(skeleton, layout, lengths):
-        size = _size(layout, lengths)
+        size = float(_sizes(layout, lengths))
         far = _furthest(layout, lengths)
         raise SceneError(
             f'{_sentence(layout, far, lengths)}, and arms and legs are those of a person of '
@@ -364,34 +401,52 @@ def _lengths(layout: _Layout, joints: Array) -> Array:
 
 def _joints(skeleton: Skeleton, posture: Posture) -> Array:
     """Return the joints and, behind them, the base, (n_joints + 1, 3), NaN where unknown."""
-    joints = np.empty((len(skeleton.joints) + 1, 3))
-    joints[:-1] = joint_positions(skeleton, posture)
-    joints[-1] = np.nan
+    return _joints_with_base(skeleton, posture.names, posture.positions, posture.rotations)
+
+
+def _joints_with_base(
+    skeleton: Skeleton, names: tuple[str, ...], positions: Array, rotations: Array | None
+) -> Array:
+    """Return the same of one posture, or of many at once, (..., n_joints + 1, 3)."""
+    joints = np.empty((*positions.shape[:-2], len(skeleton.joints) + 1, 3))
+    joints[..., :-1, :] = joints_of(skeleton, names, positions, rotations)
+    joints[..., -1, :] = np.nan
     base = skeleton.base
-    if (
-        isinstance(base, FrameBase)
-        and posture.rotations is not None
-        and base.frame in posture.names
-    ):
-        k = posture.names.index(base.frame)
-        turn = posture.rotations[k] @ skeleton.axes
-        joints[-1] = posture.positions[k] + turn @ base.offset
+    if isinstance(base, FrameBase) and rotations is not None and base.frame in names:
+        k = names.index(base.frame)
+        turn = rotations[..., k, :, :] @ skeleton.axes
+        joints[..., -1, :] = positions[..., k, :] + turn @ base.offset
     return joints
 
 
-def _size(layout: _Layout, lengths: Array) -> float:
-    """Return how tall somebody is by the lengths of arms and legs [m], NaN where too few are."""
-    sizes = (lengths / layout.shares)[layout.is_long]
-    sizes = np.sort(sizes[np.isfinite(sizes)])
-    if len(sizes) < LEAST_MEASURED:
-        return float('nan')
-    return float(0.5 * (sizes[(len(sizes) - 1) // 2] + sizes[len(sizes) // 2]))
+def _sizes(layout: _Layout, lengths: Array) -> Array:
+    """
+    Return how tall somebody is by the lengths of arms and legs [m], NaN where too few are.
+
+    lengths (..., n): of his bones; (...).
+    """
+    sizes = (lengths / layout.shares)[..., layout.is_long]
+    if sizes.shape[-1] < LEAST_MEASURED:
+        return np.full(sizes.shape[:-1], np.nan)
+    is_known = np.isfinite(sizes)
+    # What is lost comes last.
+    sizes = np.sort(np.where(is_known, sizes, np.nan), axis=-1)
+    if is_known.all():
+        most = sizes.shape[-1]
+        return np.asarray(0.5 * (sizes[..., (most - 1) // 2] + sizes[..., most // 2]))
+    n = is_known.sum(axis=-1)[..., None]
+    middle = [np.take_along_axis(sizes, np.maximum(k // 2, 0), axis=-1) for k in (n - 1, n)]
+    found: Array = np.where(n < LEAST_MEASURED, np.nan, 0.5 * (middle[0] + middle[1]))[..., 0]
+    return found
 
 
-def _is_other_size(skeleton: Skeleton, layout: _Layout, lengths: Array) -> bool:
+def _is_other_size(
+    skeleton: Skeleton, layout: _Layout, lengths: Array
+) -> NDArray[np.bool_] | np.bool_:
     low, high = skeleton.stature.tolist()
-    size = _size(layout, lengths)
-    return size < (1.0 - SIZE_TOLERANCE) * low or size > (1.0 + SIZE_TOLERANCE) * high
+    size = _sizes(layout, lengths)
+    is_other: NDArray[np.bool_] | np.bool_ = size < (1.0 - SIZE_TOLERANCE) * low
+    return is_other | (size > (1.0 + SIZE_TOLERANCE) * high)
 
 
 def _statures(skeleton: Skeleton) -> str:

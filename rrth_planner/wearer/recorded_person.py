@@ -84,15 +84,20 @@ def posture_at(person: RecordedPerson, time: float) -> Posture:
     interpolated linearly, and rotations about a fixed axis; a point that is lost in one of the two
     is lost.
     """
-    duration = person.duration
-    if duration > 0.0:
-        time = duration - abs(time % (2.0 * duration) - duration)
-    positions, rotations = _interpolated(person, np.array([min(max(time, 0.0), duration)]))
+    positions, rotations = postures_at(person, np.array([time]))
     return Posture(
         names=person.names,
         positions=positions[0],
         rotations=None if rotations is None else rotations[0],
     )
+
+
+def postures_at(person: RecordedPerson, times: Array) -> tuple[Array, Array | None]:
+    """Return positions (m, n, 3) and rotations (m, n, 3, 3) of `posture_at`, at times (m,) [s]."""
+    duration = person.duration
+    if duration > 0.0:
+        times = duration - np.abs(times % (2.0 * duration) - duration)
+    return _interpolated(person, np.minimum(np.maximum(times, 0.0), duration))
 
 
 def excerpt(

@@ -539,3 +539,36 @@ def test_interpreted_kernels_say_what_compiled_ones_say():
     for i in (8, 9, 10, 11):
         assert np.allclose(plain[i], compiled[i], rtol=0.0, atol=1e-9 if i < 11 else 1e-6)
     assert plain[12]
+
+
+def first_free_of(world, q, way, spacing, longest, n_halvings):
+    """Return what `World.first_free` does, place by place."""
+    for far in np.arange(spacing, longest, spacing).tolist():
+        if not world.is_in_bounds(q + far * way):
+            return np.nan
+        if world.is_valid(q + far * way):
+            near = far - spacing
+            for _ in range(n_halvings):
+                middle = 0.5 * (near + far)
+                if world.is_valid(q + middle * way):
+                    far = middle
+                else:
+                    near = middle
+            return far
+    return np.nan
+
+
+def test_the_first_free_place_of_a_way_is_found_as_place_by_place():
+    rng, found = np.random.default_rng(12), []
+    shares = np.arange(0.03, 1.2, 0.03)
+    for _ in range(60):
+        world = arm_world(table_1_arm(0.0), random_boxes(rng, 4), MARGIN, RAY)
+        q, way = rng.uniform(*world.bounds), rng.standard_normal(4)
+        way /= np.linalg.norm(way)
+        far = world.first_free(q, way, shares, 6)
+        assert np.array_equal(far, first_free_of(world, q, way, 0.03, 1.2, 6), equal_nan=True)
+        found.append(far)
+    # There were ways without a free place, some that began there, and some that led out.
+    assert np.isnan(found).any() and np.nanmin(found) < 0.001 and np.nanmax(found) > 0.1
+    with pytest.raises(RrthError, match='way'):
+        world.first_free(q, [1.0, 0.0], shares, 6)

@@ -9,6 +9,7 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.motion_capture_file import load_person
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.settings import load_settings
 from rrth_planner.io.skeleton_file import load_skeleton
@@ -16,8 +17,9 @@ from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.arm import forward_kinematics
 from rrth_planner.model.errors import SceneError
 from rrth_planner.model.scene import Box
-from rrth_planner.wearer.body_boxes import base_pose, body_boxes
+from rrth_planner.wearer.body_boxes import base_pose, body_boxes, rows_of_postures
 from rrth_planner.wearer.posture import Posture
+from rrth_planner.wearer.recorded_person import postures_at
 from rrth_planner.wearer.skeleton import Direction, FrameBase, Joint, JointBase, Part, Skeleton
 from worlds import examples
 
@@ -348,3 +350,28 @@ def test_an_offset_is_in_the_axes_of_the_wearer_and_a_mean_between_its_points():
     hand, pelvis = body_boxes(skeleton, posture)[0].boxes
     np.testing.assert_allclose(hand.center, [0.1, 0.02, -0.03], atol=1e-12)
     np.testing.assert_allclose(pelvis.center, (R @ axes).T @ [0.0, 0.4, 1.3], atol=1e-12)
+
+
+def test_many_postures_have_the_boxes_of_each():
+    person, skeleton = load_person(), load_skeleton('cmu_bvh')
+    names, rng = person.names, np.random.default_rng(8)
+    positions, rotations = postures_at(person, np.linspace(0.0, 9.0, 60))
+    for k in range(12):
+        point = rng.integers(len(names))
+        # A point is lost, or further away than anybody is tall, or mixed up with another one.
+        positions[k, point] = (np.nan, 7.0, positions[k, point - 1])[k % 3]
+    # Nobody is seen, and somebody ten times as tall.
+    positions[12], rotations[13] = np.nan, np.nan
+    positions[14] *= 10.0
+    rows = rows_of_postures(skeleton, names, positions, rotations)
+    n_lost = 0
+    for k in range(len(positions)):
+        posture = Posture(names=names, positions=positions[k], rotations=rotations[k])
+        try:
+            boxes = {box.name: box.numbers for box in body_boxes(skeleton, posture)[0].boxes}
+        except SceneError:
+            boxes = {}
+        for part, row in zip(skeleton.parts, rows[k], strict=True):
+            n_lost += part.name not in boxes
+            assert np.array_equal(row, boxes.get(part.name, np.full(15, np.nan)), equal_nan=True)
+    assert 0 < n_lost < rows.shape[0] * rows.shape[1]

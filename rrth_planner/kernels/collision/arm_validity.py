@@ -17,7 +17,7 @@ from rrth_planner.kernels.collision.bar_bar import (
     pair_bounds,
 )
 from rrth_planner.kernels.collision.bar_box import checked_lanes, contact_lanes, open_lanes
-from rrth_planner.kernels.jit import CHAIN, kernel, MAT, OUT_POOL, OUT_VEC, VEC
+from rrth_planner.kernels.jit import as_chain, CHAIN, kernel, MAT, OUT_POOL, OUT_VEC, VEC
 from rrth_planner.kernels.layout import (
     BAR_SIZE,
     D,
@@ -30,6 +30,7 @@ from rrth_planner.kernels.layout import (
     REACH,
     STRIDE,
 )
+from rrth_planner.kernels.vectors import is_within
 
 # Room for the numbers that `chain` writes of a configuration.
 ENDS_ROOM = BAR_SIZE * MAX_BARS + FRAME_SIZE * MAX_FRAMES
@@ -106,6 +107,38 @@ def is_configuration_free(q, ray_length, chain, robot, boxes):
     if robot.shape[0] > dof + 2 + n_bars:
         return colliding_pair(points, 0, dof, robot) < 0
     return True
+
+
+@kernel(float64(VEC, VEC, VEC, int64, float64, int64, MAT, MAT, MAT), is_short=True, is_exact=True)
+def first_free(q, way, shares, n_halvings, ray_length, address, robot, boxes, bounds):
+    """
+    Return the first share of a way at which the arm is free, NaN: at none within its bounds.
+
+    q, way (dof,) [rad]; shares (m,): tried one after the other, as far apart as the first is from
+    0; between the last that is not free and that which is, by halving. The rest as for
+    `is_configuration_free`; address: of the chain.
+    """
+    chain, there = as_chain(address), scratch.floats(MAX_DOF)
+    place = there[: q.shape[0]]
+    for far in shares:
+        for k in range(q.shape[0]):
+            place[k] = q[k] + far * way[k]
+        if not is_within(place, bounds):
+            return math.nan
+        if not is_configuration_free(place, ray_length, chain, robot, boxes):
+            continue
+        near = far - shares[0]
+        for _ in range(n_halvings):
+            middle = 0.5 * (near + far)
+            for k in range(q.shape[0]):
+                place[k] = q[k] + middle * way[k]
+            is_inside = is_within(place, bounds)
+            if is_inside and is_configuration_free(place, ray_length, chain, robot, boxes):
+                far = middle
+            else:
+                near = middle
+        return far
+    return math.nan
 
 
 @kernel(void(MAT, int64, VEC, VEC, OUT_VEC))

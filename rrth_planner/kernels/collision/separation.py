@@ -76,27 +76,56 @@ def cut(curve, begin, end, part):
             scale *= end - begin
 
 
-@kernel(float64(OUT_VEC, int64, float64, float64, float64, MAT, int64))
-def within_distance(points, at, low, high, distance, rows, box):
+@kernel(void(OUT_VEC, int64, MAT, int64, OUT_VEC), is_inlined=True, is_inner=True)
+def line_from_box(points, at, rows, box, line):
     """
-    Return how far a part of a line is from a box; where that is more than a distance, more [m].
+    Write a line as seen from a box, its begin and its end, (6,) [m].
 
-    The line from points[at] to points[at + 4], of it the part between two shares; rows (18, m) as
-    from `boxes.rows_of`. Signed: < 0 inside.
+    From points[at] to points[at + 4]; rows (18, m) as from `boxes.rows_of`.
     """
-    start, step, half = scratch.floats(3), scratch.floats(3), scratch.floats(3)
-    gap = -math.inf
     for r in range(3):
         first = last = rows[BOX_OFFSET + r, box]
         for c in range(3):
             cosine = rows[3 * r + c, box]
             first += cosine * points[at + c]
             last += cosine * points[at + 4 + c]
+        line[r], line[3 + r] = first, last
+
+
+@kernel(float64(OUT_VEC, MAT, int64), is_inlined=True, is_inner=True)
+def line_gap(line, rows, box):
+    """Return the distance of a line, as from `line_from_box`, along the axes of a box [m]."""
+    gap = -math.inf
+    for r in range(3):
+        first, last, half = line[r], line[3 + r], rows[BOX_HALF + r, box]
+        gap = max(gap, min(first, last) - half, -max(first, last) - half)
+    return gap
+
+
+@kernel(float64(OUT_VEC, float64, float64, float64, MAT, int64), is_inlined=True, is_inner=True)
+def part_within(line, low, high, distance, rows, box):
+    """
+    Return how far a part of a line is from a box; where that is more than a distance, more [m].
+
+    line (6,): as from `line_from_box`, of it the part between two shares. Signed: < 0 inside.
+    """
+    start, step, half = scratch.floats(3), scratch.floats(3), scratch.floats(3)
+    gap = -math.inf
+    for r in range(3):
+        first, last = line[r], line[3 + r]
         begin, end = first + low * (last - first), first + high * (last - first)
         start[r], step[r], half[r] = begin, end - begin, rows[BOX_HALF + r, box]
         gap = max(gap, min(begin, end) - half[r], -max(begin, end) - half[r])
     # Mostly a face of the box shows that it is further away.
     return gap if gap > distance else bar_box_distance(start, step, half)
+
+
+@kernel(float64(OUT_VEC, int64, float64, float64, float64, MAT, int64))
+def within_distance(points, at, low, high, distance, rows, box):
+    """Return the same of a line from points[at] to points[at + 4]."""
+    line = scratch.floats(6)
+    line_from_box(points, at, rows, box, line)
+    return part_within(line, low, high, distance, rows, box)
 
 
 @kernel(boolean(float64, float64, float64, OUT_VEC))
@@ -273,22 +302,31 @@ def latest_times(points, bodies, dof, robot, rows, growths, speeds, latest):
     points: the bars at a place; growths, speeds (m,): of the boxes at time 0 [s]. Below 0: it is
     within a box then already.
     """
-    m = rows.shape[1]
+    m, line = rows.shape[1], scratch.floats(6)
     for bar in range(bodies.shape[0]):
         at, radius = BAR_SIZE * bar, points[BAR_SIZE * bar + 7]
         for section in range(SECTIONS):
-            low, high = section / SECTIONS, (section + 1) / SECTIONS
-            best = LATEST
-            for box in range(m):
-                if may_meet(rows, box, bar):
-                    continue
+            latest[SECTIONS * bar + section] = LATEST
+        last = LATEST
+        for box in range(m):
+            if may_meet(rows, box, bar):
+                continue
+            line_from_box(points, at, rows, box, line)
+            # Further from the whole bar it matters to no section.
+            if line_gap(line, rows, box) > radius + growths[box] + speeds[box] * last:
+                continue
+            last = -1.0
+            for section in range(SECTIONS):
+                low, high = section / SECTIONS, (section + 1) / SECTIONS
+                best = latest[SECTIONS * bar + section]
                 # Nearer than this it matters.
                 within = radius + growths[box] + speeds[box] * best
-                near = within_distance(points, at, low, high, within, rows, box)
+                near = part_within(line, low, high, within, rows, box)
                 room = near - radius - growths[box]
                 if room < speeds[box] * best:
                     best = room / speeds[box] if speeds[box] > 0.0 and room >= 0.0 else -1.0
-            latest[SECTIONS * bar + section] = best
+                    latest[SECTIONS * bar + section] = best
+                last = max(last, best)
 
 
 @kernel(
@@ -329,6 +367,8 @@ def is_rate_safe(rate, place, v, gains, a, j, step, latest, ends, contact, n_bar
             begin, end = ends[k, 2 * bar], ends[k, 2 * bar + 1]
             begin += part * (ends[k + 1, 2 * bar] - begin)
             end += part * (ends[k + 1, 2 * bar + 1] - end)
+            if share * begin <= contact and share * end <= contact:
+                continue
             for section in range(SECTIONS):
                 faster = (section + 1) / SECTIONS if end > begin else section / SECTIONS
                 if share * (begin + faster * (end - begin)) <= contact:

@@ -6,7 +6,7 @@ from numba.core.types import boolean, float64, int64, void
 import numpy as np
 from rrth_planner.kernels.collision.arm_validity import is_configuration_free, prove_curve
 from rrth_planner.kernels.collision.boxes import pack, rows_of
-from rrth_planner.kernels.jit import CHAIN, CUBE, kernel, MAT, OUT_MAT, READ_INTS, VEC
+from rrth_planner.kernels.jit import as_chain, CHAIN, CUBE, kernel, MAT, OUT_MAT, READ_INTS, VEC
 from rrth_planner.kernels.layout import BOX_ROWS, D, LANES
 from rrth_planner.kernels.trajectory.quintics import bound, fit
 
@@ -66,14 +66,14 @@ def packed(boxes, allowed, T_arm_base, growth, depth):
     return groups
 
 
-@kernel(boolean(VEC, float64, CHAIN, MAT, *NEW), is_short=True)
-def is_place_free(q, ray_length, chain, robot, boxes, allowed, T_arm_base, growth, depth):
+@kernel(boolean(VEC, float64, int64, MAT, *NEW), is_short=True)
+def is_place_free(q, ray_length, address, robot, boxes, allowed, T_arm_base, growth, depth):
     """Return whether the arm at q (dof,) is free of newly received boxes and itself, as below."""
     groups = packed(boxes, allowed, T_arm_base, growth, depth)
-    return is_configuration_free(q, ray_length, chain, robot, groups)
+    return is_configuration_free(q, ray_length, as_chain(address), robot, groups)
 
 
-@kernel(boolean(*POINTS, float64, float64, float64, CHAIN, MAT, *NEW, MAT, MAT), is_short=True)
+@kernel(boolean(*POINTS, float64, float64, float64, int64, MAT, *NEW, MAT, MAT), is_short=True)
 def is_remaining_motion_free(
     times,
     positions,
@@ -82,7 +82,7 @@ def is_remaining_motion_free(
     begin,
     reach,
     resolution,
-    chain,
+    address,
     robot,
     boxes,
     allowed,
@@ -97,11 +97,11 @@ def is_remaining_motion_free(
 
     In one call, since it decides about a stop. At the end a ray of length `reach` has to be free
     too [m]. times (n,) [s], positions, velocities and accelerations (n, dof), n > 1: points of
-    the motion, of which only what comes after `begin` counts [s]; boxes (m, 15),
-    allowed (m,), T_arm_base (4, 4), growth [m] and depth as for `rows_of` and `pack` in `boxes`;
-    quartic and cubic as for `quintics.bound`.
+    the motion, of which only what comes after `begin` counts [s]; address: of the chain; boxes
+    (m, 15), allowed (m,), T_arm_base (4, 4), growth [m] and depth as for `rows_of` and `pack` in
+    `boxes`; quartic and cubic as for `quintics.bound`.
     """
-    n_pieces, dof = positions.shape[0] - 1, positions.shape[1]
+    n_pieces, dof, chain = positions.shape[0] - 1, positions.shape[1], as_chain(address)
     curves = np.empty((n_pieces, 6, dof))
     fit(times, positions, velocities, accelerations, curves)
     groups = packed(boxes, allowed, T_arm_base, growth, depth)
