@@ -86,14 +86,14 @@ def stay_awake(pipe: Connection) -> None:
             pass
 
 
-def lose_time_asleep() -> bool:
+def lose_time_asleep(cpuinfo: Path = CPUINFO, cpu_max: Path = CPU_MAX) -> bool:
     """
     Return whether processors that sleep come back late, and may be kept awake.
 
     The host of a virtual machine hands a halted processor to others, and takes up to tens of
     milliseconds to give it back. In a container with a quota keeping awake would use that up.
     """
-    if not hasattr(os, 'SCHED_IDLE') or not CPUINFO.exists():
+    if not hasattr(os, 'SCHED_IDLE') or not cpuinfo.exists():
         return False
-    has_quota = CPU_MAX.exists() and not CPU_MAX.read_text().startswith('max')
-    return not has_quota and ' hypervisor' in CPUINFO.read_text()
+    has_quota = cpu_max.exists() and not cpu_max.read_text().startswith('max')
+    return not has_quota and ' hypervisor' in cpuinfo.read_text()

@@ -22,8 +22,7 @@ from rrth_planner.planning.options import TreeOptions
 
 # Period of the check for cancellation [s].
 POLL_PERIOD = 2e-2
-# A process hangs that has not answered so long after a cancellation, the time limit of a plan, or
-# any other question [s]. To end it and to answer for it takes less than a second more.
+# As `longest_stop` of a planning process [s].
 LONGEST_STOP = 4.0
 # So does one that has not warmed up for so long; what is compiled in memory takes minutes [s].
 LONGEST_WARM_UP = 600.0
@@ -83,6 +82,9 @@ class PlanningProcess:
         Called with a sentence after the process has died, or was killed since it hangs.
     worker : WorkerProcess, optional
         One that is started already.
+    longest_stop : float
+        It hangs where it has not answered so long after a cancellation, the time limit of a plan,
+        or any other question [s]. To end it and to answer for it takes less than a second more.
 
     """
 
@@ -93,8 +95,10 @@ class PlanningProcess:
         on_death: Callable[[str], None] = lambda sentence: None,
         worker: WorkerProcess | None = None,
         second_checker: str = 'fcl',
+        longest_stop: float = LONGEST_STOP,
     ) -> None:
         """Start it."""
+        self._longest_stop = longest_stop
         self._warm_up, self._on_death = (arm, options, second_checker), on_death
         self._start(worker or WorkerProcess())
 
@@ -109,7 +113,7 @@ class PlanningProcess:
         self, question: PlanQuestion, should_stop: Callable[[], bool] = lambda: False
     ) -> MotionPlan:
         """As of `Planner`."""
-        longest = question.options.time_limit + LONGEST_STOP
+        longest = question.options.time_limit + self._longest_stop
         plan: MotionPlan = self._ask(longest, 'plan', *parts_of(question), should_stop=should_stop)
         return plan
 
@@ -117,7 +121,9 @@ class PlanningProcess:
         """As of `Planner`."""
         # Its arm is a part of the message, and sent once.
         parts = required.arm, required.margin, required.ray_guard_length, required.library
-        violation: Violation | None = self._ask(LONGEST_STOP, 'violation_seen', *parts, *others)
+        violation: Violation | None = self._ask(
+            self._longest_stop, 'violation_seen', *parts, *others
+        )
         return violation
 
     def close(self) -> None:
@@ -176,7 +182,10 @@ class PlanningProcess:
                 while not self._channel.is_readable(POLL_PERIOD):
                     present = time.monotonic()
                     if not is_stopped and should_stop():
-                        is_stopped, self._hangs = True, min(self._hangs, present + LONGEST_STOP)
+                        is_stopped, self._hangs = (
+                            True,
+                            min(self._hangs, present + self._longest_stop),
+                        )
                         self._channel.send(STOP)
                     if present > self._hangs:
                         self._worker.kill()

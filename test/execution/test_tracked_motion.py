@@ -97,7 +97,7 @@ def test_an_arm_that_misses_its_stop_is_detected(seed, rate):
         return q, rate * v
 
     # Once it is past all places that the stop has come to by then.
-    due, n = set(), 10_000
+    due, n = set(), 2_500
     way = sample(stop.trajectory, np.linspace(0.0, left, n))[0]
     # From there on all are the same place.
     at_rest = 2 + int(n * stop.trajectory.duration / left)

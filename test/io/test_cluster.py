@@ -13,13 +13,19 @@ pytest.importorskip('tqdm')
 
 import dask
 from rrth_planner.io import cluster
-from rrth_planner.io.cluster import cluster_client, collect, in_order, on_each_worker
+from rrth_planner.io.cluster import (
+    cluster_client,
+    collect,
+    in_order,
+    on_each_worker,
+    TASKS_AHEAD,
+)
 from rrth_planner.model.errors import RrthError
 
 
 def squared(number):
     """Return a square, the sooner the greater it is."""
-    time.sleep(0.02 * (number % 3 == 0))
+    time.sleep(0.005 * (number % 3 == 0))
     return number**2
 
 
@@ -42,19 +48,18 @@ def _client():
         yield client
 
 
-def test_results_come_in_order_and_few_are_handed_out_ahead(client, monkeypatch):
-    monkeypatch.setattr(cluster, 'TASKS_AHEAD', 3)
-    handed = []
+def test_results_come_in_order_and_few_are_handed_out_ahead(client):
+    handed, n = [], 100 + 2 * TASKS_AHEAD
 
     def batches():
-        for number in range(40):
+        for number in range(n):
             handed.append(number)
             yield number
 
     results = in_order(client, squared, batches())
     assert list(islice(results, 5)) == [0, 1, 4, 9, 16]
-    assert len(handed) <= 5 + 3 * 2
-    assert list(results) == [number**2 for number in range(5, 40)]
+    assert len(handed) <= 5 + TASKS_AHEAD * 2
+    assert list(results) == [number**2 for number in range(5, n)]
 
 
 def test_each_worker_answers(client):

@@ -3,6 +3,7 @@
 """The URDF of a person becomes a tree of links, whose poses are those of yourdfpy."""
 
 import io
+import sys
 
 from human_urdf import human_urdf, joint_of, LINKS, MOVING
 import numpy as np
@@ -12,7 +13,6 @@ from rrth_planner.wearer.link_tree import link_poses
 
 yourdfpy = pytest.importorskip('yourdfpy')
 
-from rrth_planner.io import extras  # noqa: E402
 from rrth_planner.io.urdf.tree import link_tree_from_urdf  # noqa: E402
 
 
@@ -56,6 +56,6 @@ def test_what_is_no_person_is_rejected_in_one_sentence(old, new, words):
 
 
 def test_a_missing_library_is_named(monkeypatch):
-    monkeypatch.setattr(extras, 'find_spec', lambda name: None)
+    monkeypatch.setitem(sys.modules, 'yourdfpy', None)
     with pytest.raises(NotInstalledError, match=r'needs yourdfpy.*pip install'):
         link_tree_from_urdf(human_urdf(), 'robot_description')

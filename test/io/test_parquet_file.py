@@ -7,8 +7,7 @@ import pytest
 pa = pytest.importorskip('pyarrow')
 
 import pyarrow.parquet as pq
-from rrth_planner.io import parquet_file
-from rrth_planner.io.parquet_file import append_table, read_table, write_table
+from rrth_planner.io.parquet_file import append_table, GROUP_ROWS, read_table, write_table
 from rrth_planner.model.errors import RrthError
 
 SCHEMA = pa.schema([('name', pa.string()), ('value', pa.float64())])
@@ -20,18 +19,17 @@ def rows(first, end):
     return pa.table([[f'row {k}' for k in numbers], [k / 3.0 for k in numbers]], schema=SCHEMA)
 
 
-def test_rows_are_added_at_the_end_in_groups_of_bounded_size(tmp_path, monkeypatch):
-    monkeypatch.setattr(parquet_file, 'GROUP_ROWS', 7)
-    path = tmp_path / 'folder' / 'rows.parquet'
-    for first in range(0, 20, 5):
-        append_table(path, rows(first, first + 5))
-    assert read_table(path, SCHEMA, 'rows').equals(rows(0, 20))
+def test_rows_are_added_at_the_end_in_groups_of_bounded_size(tmp_path):
+    path, n = tmp_path / 'folder' / 'rows.parquet', 2 * GROUP_ROWS // 3
+    for first in range(0, 4 * n, n):
+        append_table(path, rows(first, first + n))
+    assert read_table(path, SCHEMA, 'rows').equals(rows(0, 4 * n))
     sizes = [
         pq.read_metadata(path).row_group(k).num_rows
         for k in range(pq.read_metadata(path).num_row_groups)
     ]
-    assert sum(sizes) == 20
-    assert max(sizes) <= 7
+    assert sum(sizes) == 4 * n
+    assert max(sizes) <= GROUP_ROWS
 
 
 def test_what_the_schema_says_beside_the_columns_is_kept(tmp_path):

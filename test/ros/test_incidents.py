@@ -2,10 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """What never should happen, through the node: answered, kept in a file, never published."""
 
+from contextlib import suppress
+from dataclasses import replace
 import os
 from pathlib import Path
 import subprocess
 import sys
+import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,12 +18,12 @@ pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 
 from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
-from monitored import know  # noqa: E402
-from rcl_interfaces.msg import Log  # noqa: E402
+from monitored import without_separation  # noqa: E402
+from rclpy.node import Node  # noqa: E402
+from rclpy.parameter import Parameter  # noqa: E402
 from rrth_planner.cli import replay  # noqa: E402
 from rrth_planner.collision import trajectory_validation  # noqa: E402
-from rrth_planner.collision.violation import Violation  # noqa: E402
-from rrth_planner.execution.watch import Stop  # noqa: E402
+from rrth_planner.collision.violation import Disagreement, Violation  # noqa: E402
 from rrth_planner.io.incident import IncidentKind  # noqa: E402
 from rrth_planner.io.incident_file import read_incident  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
@@ -33,10 +37,11 @@ from rrth_planner.requests.answer import CODE_OF_STATUS  # noqa: E402
 from rrth_planner.requests.outcome import Outcome  # noqa: E402
 from rrth_planner.ros.interface import reporter  # noqa: E402
 from rrth_planner.ros.interface.inputs import Inputs  # noqa: E402
-from rrth_planner.ros.messages.body import scene_of, WearerBody  # noqa: E402
-from rrth_planner.timing.fast_stop import fast_stop  # noqa: E402
+from rrth_planner.ros.interface.parameters import declare_parameters  # noqa: E402
+from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
 import samples  # noqa: E402
 from stranger import _start, inputs_of, say_all  # noqa: E402, F401
+from visualization_msgs.msg import Marker  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
 ROOT = Path(__file__).parent.parent.parent
@@ -46,6 +51,13 @@ SENTENCE = (
     'FAILURE (99999): the two collision checks disagree: pointing ray is 0.0123 m from box "head" '
     'at 0.250 s, expected at least 0.02 m'
 )
+
+
+@pytest.fixture(name='node')
+def _node():
+    node = Node('incidents')
+    yield node
+    node.destroy_node()
 
 
 LEVELS = {10: 'debug', 20: 'info', 30: 'warning', 40: 'error'}
@@ -73,6 +85,37 @@ def replayed_elsewhere(file, _):
     )
     assert found.stderr == ''
     return found.returncode, found.stdout
+
+
+def disagree(stranger):
+    """Have the two checkers disagree about the next motion that is planned."""
+    plan_question = stranger.script.plans
+
+    def plan(*question):
+        stranger.script.plans = plan_question
+        found = plan_question(*question)
+        disagreement = Disagreement(found.trajectory, VIOLATION, found.escape_time)
+        return replace(
+            found,
+            status=PlanStatus.NOT_CERTIFIED,
+            sentence=f'{disagreement.sentence(0.02)}, seed 5',
+            trajectory=None,
+            disagreement=disagreement,
+        )
+
+    stranger.script.plans = plan
+
+
+def send_no_motion(stranger):
+    """Have the middleware fail to send the next motion."""
+
+    def sends(topic, msg, send):
+        if topic == 'joint_trajectory':
+            stranger.script.sends = lambda topic, msg, send: send(msg)
+            raise OSError('no publisher')
+        send(msg)
+
+    stranger.script.sends = sends
 
 
 def level(stranger):
@@ -103,7 +146,7 @@ def test_a_disagreement_is_answered_and_kept_to_be_replayed(
     assert message == f'{SENTENCE}, seed 5; to replay it: ./run exec replay {file}; answer 1'
     stranger.wait_until(lambda: stranger.value('last incident') == str(file))
     assert stranger.value('incidents') == '1'
-    assert stranger.value('last code') == 'FAILURE (99999)'
+    stranger.wait_until(lambda: stranger.value('last code') == 'FAILURE (99999)')
     assert level(stranger) == DiagnosticStatus.ERROR
     assert nothing_published(stranger)
 
@@ -138,35 +181,48 @@ def test_a_disagreement_is_answered_and_kept_to_be_replayed(
 
 
 def test_a_stop_that_violates_for_the_second_checker_is_kept_to_be_replayed(
-    start, monkeypatch, tmp_path, capsys
+    start, tmp_path, capsys
 ):
-    planner, stranger = start(incident_folder=str(tmp_path), seed=5)
+    planner, stranger = start(incident_folder=str(tmp_path), seed=5, replan=False)
     say_all(planner, stranger)
     assert stranger.answer().success
-    monitor, parameters = planner._monitor, planner._reporter.parameters
-    stop = fast_stop(monitor.watch.running.trajectory, 0.3, parameters.limits)
-    scene, goal = scene_of(inputs_of(planner).body.value), inputs_of(planner).target.value
+    asked, violation_seen = [], stranger.script.checks
+
+    def plan_again():
+        """Have the fence taken away, and a motion begin."""
+        gone = [samples.command(Marker.DELETE, 'plate', k) for k in range(4)]
+        free = samples.array(*gone, *samples.wearer().markers)
+
+        def is_planned():
+            # What is taken away while the arm moves is still there for a while.
+            stranger.publishers['body_boxes'].publish(free)
+            return stranger.answer().success
+
+        stranger.wait_until(is_planned)
 
     def check(violation):
-        """Have a stop checked by a checker that finds this."""
-        asked, violation_seen = [], planner._planner.violation_seen
+        """Have the arm stopped for a fence, by a checker that then finds this; return the stop."""
+        asked.clear()
 
-        def ask(*arguments):
+        def seen(*arguments):
             found = violation_seen(*arguments)
-            asked.append(found)
-            return found
+            asked.append(arguments)
+            return violation or found
 
-        with monkeypatch.context() as patch:
-            patch.setattr(trajectory_validation, 'first_violation', lambda *_: violation)
-            patch.setattr(planner._planner, 'violation_seen', ask)
-            found = Stop(stop, goal, parameters, scene, False, monitor.watch.n_motions)
-            # In the thread that also decides.
-            planner.executor.create_task(know, monitor, stops=(found,))
-            stranger.wait_until(lambda: asked)
+        stranger.script.checks = seen
+        for _ in range(10):
+            # A body that a busy machine checks late stops it, too, but unproven.
+            stranger.publishers['body_boxes'].publish(samples.fenced())
+            with suppress(AssertionError):
+                stranger.wait_until(lambda: asked, 3.0)
+                return asked[0][2]
+            plan_again()
+        raise AssertionError('no stop was proven')
 
     # What agrees leaves nothing behind.
     check(None)
-    check(VIOLATION)
+    plan_again()
+    stop = check(VIOLATION)
     stranger.wait_until(lambda: list(tmp_path.glob('incident-*')))
     (file,) = tmp_path.glob('incident-*')
     stranger.wait_until(lambda: stranger.value('last incident') == str(file))
@@ -177,14 +233,13 @@ def test_a_stop_that_violates_for_the_second_checker_is_kept_to_be_replayed(
     assert replayed(file, capsys)[0] == 1
 
 
-def test_a_folder_that_cannot_be_written_does_not_break_the_answer(start, monkeypatch, tmp_path):
+def test_a_folder_that_cannot_be_written_does_not_break_the_answer(start, tmp_path):
     file = tmp_path / 'file'
     file.write_text('')
     planner, stranger = start(incident_folder=str(file / 'folder'), seed=5)
     say_all(planner, stranger)
-    with monkeypatch.context() as patch:
-        patch.setattr(trajectory_validation, 'first_violation', lambda *_: VIOLATION)
-        message = stranger.answer().message
+    disagree(stranger)
+    message = stranger.answer().message
     assert message.startswith(
         f'{SENTENCE}, seed 5; no file was written to replay it: NotADirectoryError: '
     )
@@ -197,10 +252,9 @@ def test_a_folder_that_cannot_be_written_does_not_break_the_answer(start, monkey
 def test_files_are_kept_among_the_logs_by_default(start, monkeypatch, tmp_path):
     planner, stranger = start()
     say_all(planner, stranger)
-    with monkeypatch.context() as patch:
-        patch.setenv('ROS_LOG_DIR', str(tmp_path))
-        patch.setattr(trajectory_validation, 'first_violation', lambda *_: VIOLATION)
-        message = stranger.answer().message
+    monkeypatch.setenv('ROS_LOG_DIR', str(tmp_path))
+    disagree(stranger)
+    message = stranger.answer().message
     (file,) = (tmp_path / 'rrth_planner').glob('incident-*')
     assert message.endswith(f'{file}; answer 1')
 
@@ -209,27 +263,19 @@ def test_an_error_that_cannot_be_recorded_is_answered(start, monkeypatch):
     planner, stranger = start()
     say_all(planner, stranger)
 
-    def fail(*_):
-        raise OSError('nothing works')
-
-    with monkeypatch.context() as patch:
-        patch.setattr(planner._queue._publishers, 'publish_motion', fail)
-        patch.setattr(incidents, 'error_incident', fail)
-        message = stranger.answer().message
-    assert message == f'{UNEXPECTED}OSError: nothing works; answer 1'
+    send_no_motion(stranger)
+    monkeypatch.setattr(incidents, 'error_incident', lambda *_: 1 / 0)
+    message = stranger.answer().message
+    assert message == f'{UNEXPECTED}OSError: no publisher; answer 1'
     assert stranger.answer().success
 
 
-def test_an_error_after_the_plan_is_kept_with_the_motion(start, monkeypatch, tmp_path, capsys):
+def test_an_error_after_the_plan_is_kept_with_the_motion(start, tmp_path, capsys):
     planner, stranger = start(incident_folder=str(tmp_path), seed=5)
     say_all(planner, stranger)
 
-    def fail(*_):
-        raise OSError('no publisher')
-
-    with monkeypatch.context() as patch:
-        patch.setattr(planner._queue._publishers, 'publish_motion', fail)
-        message = stranger.answer().message
+    send_no_motion(stranger)
+    message = stranger.answer().message
     (file,) = tmp_path.glob('incident-*')
     assert message == (
         'FAILURE (99999): planning failed unexpectedly: OSError: no publisher; to replay it: '
@@ -262,31 +308,27 @@ def test_an_error_before_anything_was_asked_leaves_no_file(start, monkeypatch, t
     assert stranger.answer().success
 
 
-def test_each_request_is_logged_once_with_figures_or_with_its_code(start, monkeypatch, tmp_path):
+def test_each_request_is_logged_once_with_figures_or_with_its_code(start, tmp_path):
     planner, stranger = start(seed=3, incident_folder=str(tmp_path))
-    stranger.subscribe('/rosout', Log, 100)
-    name = planner.get_logger().name
+    logged = stranger.lines(planner)
     say_all(planner, stranger)
-    stranger.wait_until(lambda: planner.count_subscribers('/rosout') > 0)
     answers = [stranger.answer() for _ in range(2)]
-    with monkeypatch.context() as patch:
-        patch.setattr(trajectory_validation, 'first_violation', lambda *_: VIOLATION)
-        answers.append(stranger.answer())
+    disagree(stranger)
+    answers.append(stranger.answer())
     stranger.say('target', samples.target(0.0, 0.0, 0.0))
     stranger.wait_until(lambda: not inputs_of(planner).target.value.target.any())
     answers.append(stranger.answer())
 
     def lines():
-        return [
-            msg for msg in stranger.received['/rosout'] if msg.name == name and '): ' in msg.msg
-        ]
+        return [(LEVELS[level], line) for level, line in logged if '): ' in line]
 
     stranger.wait_until(lambda: len(lines()) == len(answers))
-    assert [msg.msg for msg in lines()] == [answer.message for answer in answers]
-    assert [LEVELS[msg.level] for msg in lines()] == ['info', 'info', 'error', 'warning']
+    levels, said = zip(*lines(), strict=True)
+    assert list(said) == [answer.message for answer in answers]
+    assert levels == ('info', 'info', 'error', 'warning')
     for word in ('waypoints', 'duration', 'path length', 'clearance', 'planning time', 'seed 3'):
-        assert word in lines()[0].msg
-    assert lines()[-1].msg.startswith('GOAL_IN_COLLISION (-12): the target (0.000, 0.000, 0.000)')
+        assert word in said[0]
+    assert said[-1].startswith('GOAL_IN_COLLISION (-12): the target (0.000, 0.000, 0.000)')
 
 
 def test_diagnostics_say_everything(start):
@@ -311,13 +353,15 @@ def test_diagnostics_say_everything(start):
         assert isinstance(stranger.value(name), str)
 
 
-def test_the_summary_of_diagnostics_is_what_is_worst(start):
-    planner, _ = start(body_timeout=1.0)
+def test_the_summary_of_diagnostics_is_what_is_worst():
+    given = {'separation': False, 'body_timeout': 1.0}
+    overrides = [Parameter(name, value=value) for name, value in given.items()]
+    parameters = declare_parameters(Node('summary', parameter_overrides=overrides))
     inputs = Inputs('body', 'target', 'joints')
 
     def summary(now=10.0, code=None, sentence=''):
         last = None if code is None else Outcome(code, sentence)
-        return reporter.summary(now, inputs, planner._reporter.parameters, last)
+        return reporter.summary(now, inputs, parameters, last)
 
     def reject():
         raise MessageError('no point')
@@ -336,18 +380,29 @@ def test_the_summary_of_diagnostics_is_what_is_worst(start):
     assert summary(11.5, ErrorCode.FAILURE, 'it broke') == broken
 
 
-def test_only_so_many_lost_parts_are_remembered_as_named(start, monkeypatch):
-    monkeypatch.setattr(reporter, 'MOST_NAMED', 3)
-    planner, _ = start()
-    source = inputs_of(planner).body
-    for k in range(20):
-        hat = samples.box('hat', k)
-        hat.lifetime.nanosec = 1
-        source.value = WearerBody().apply(samples.array(hat), 0.0, 'torso')
-        planner._reporter._warn_of_lost(1.0)
-        named = planner._reporter._named
-        assert ('hat', k) in named
-        assert len(named) <= 5
+def test_only_so_many_lost_parts_are_remembered_as_named(node):
+    lines = []
+    node.get_logger = lambda: SimpleNamespace(warning=lambda line, **_: lines.append(line))
+    inputs = Inputs('body', 'target', 'joints')
+    reporting = reporter.Reporter(node, inputs, without_separation(node))
+
+    def lose(name, n):
+        """Return the lines that are logged where so many parts of a name are lost."""
+        lines.clear()
+        hats = [samples.box(name, k) for k in range(n)]
+        for hat in hats:
+            hat.lifetime.nanosec = 1
+        inputs.body.value = WearerBody().apply(samples.array(*hats), 0.0, 'torso')
+        time.sleep(reporter.SHORTEST_PERIOD)
+        reporting.publish()
+        return [line for line in lines if 'lifetime of' in line]
+
+    assert len(lose('hat', reporter.MOST_NAMED + 1)) == 1
+    assert not lose('hat', reporter.MOST_NAMED + 1)
+    # Of more than so many only those are remembered that are lost now.
+    assert len(lose('glove', 1)) == 1
+    assert not lose('glove', 1)
+    assert len(lose('hat', 1)) == 1
 
 
 def test_every_end_of_a_plan_has_a_code_of_its_own_kind():

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Names, frames, clocks and liveliness of the nodes, from outside."""
 
+import os
+import signal
 import time
 from types import SimpleNamespace
 
@@ -21,7 +23,6 @@ from rclpy.time import Time as RosTime  # noqa: E402
 from rosgraph_msgs.msg import Clock  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.model.arm import pointing_error  # noqa: E402
-from rrth_planner.pipeline import in_process_planner  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
 from rrth_planner.ros.interface import scene_monitor  # noqa: E402
 from rrth_planner.ros.messages import frames  # noqa: E402
@@ -183,8 +184,11 @@ class FakeTransformError(Exception):
 class FakeBuffer:
     """The part of tf2_ros.Buffer that the planner uses: one frame is known."""
 
+    made = []
+
     def __init__(self, *, node):
         self.node, self.listener = node, None
+        self.made.append(self)
         # The newest transform that came [ns]; it moves forward by a metre each second.
         self.newest = 0
 
@@ -228,7 +232,7 @@ def _tf(monkeypatch):
 @pytest.mark.usefixtures('tf')
 def test_frames_that_tf_knows_are_transformed_and_others_named(start):
     planner, stranger = start()
-    buffer = planner._scene_monitor._frames._buffer
+    buffer = FakeBuffer.made[-1]
     assert buffer.node is buffer.listener is planner
     # (0.1, -0.5, 0.3) from the camera is (1.5, 0.1, 0.3) from the torso.
     say_all(planner, stranger, target=target(0.1, -0.5, 0.3, 'camera'))
@@ -264,14 +268,13 @@ def with_late_hat(start, monkeypatch):
 @pytest.mark.usefixtures('tf')
 def test_a_body_waits_for_its_frame_and_those_after_it_wait_too(start, monkeypatch):
     planner, stranger, hat, now = with_late_hat(start, monkeypatch)
-    body, waiting = inputs_of(planner).body, planner._scene_monitor._waiting
-    buffer, out = planner._scene_monitor._frames._buffer, stranger.publishers['body_boxes']
+    body, buffer = inputs_of(planner).body, FakeBuffer.made[-1]
+    out, n_good, n_boxes = stranger.publishers['body_boxes'], body.n_good, body.value.n_boxes
     out.publish(array(command(Marker.DELETE, 'hat'), box('pack', center=(-1.0, 0.0, -1.0))))
-    stranger.wait_until(lambda: len(waiting) == 2)
-    n_good, n_boxes = body.n_good, body.value.n_boxes
+    stranger.await_turn()
+    assert body.n_good == n_good
     buffer.newest = now.nanoseconds
     stranger.wait_until(lambda: body.n_good == n_good + 2)
-    assert not waiting
     assert body.value.n_boxes == n_boxes + 1
     assert not body.value.without(['pack'])
     # One whose frame never comes is rejected.
@@ -312,19 +315,19 @@ def test_what_measures_no_part_makes_no_body_younger(start):
 @pytest.mark.usefixtures('tf')
 def test_what_is_no_body_stands_rejected_though_one_before_it_is_read_later(start, monkeypatch):
     planner, stranger, hat, now = with_late_hat(start, monkeypatch)
-    body, waiting = inputs_of(planner).body, planner._scene_monitor._waiting
+    body, buffer = inputs_of(planner).body, FakeBuffer.made[-1]
     out = stranger.publishers['body_boxes']
     out.publish(b'\0\1\0\0' + b'\xff' * 40)
-    stranger.wait_until(lambda: len(waiting) == 1 and body.is_last_rejected)
+    stranger.wait_until(lambda: body.is_last_rejected)
     n_good, measured = body.n_good, body.measured
-    planner._scene_monitor._frames._buffer.newest = now.nanoseconds
+    buffer.newest = now.nanoseconds
     stranger.wait_until(lambda: body.n_good == n_good + 1)
     assert body.value.without(['hat']) == []
     assert body.is_last_rejected
     assert body.measured == measured
     assert stranger.answer().message.startswith('SENSOR_INFO_STALE (-24): the last message')
     hat.header.stamp = planner.get_clock().now().to_msg()
-    planner._scene_monitor._frames._buffer.newest = now.nanoseconds + 10**12
+    buffer.newest = now.nanoseconds + 10**12
     out.publish(array(hat))
     stranger.wait_until(lambda: not body.is_last_rejected)
     assert stranger.answer().success
@@ -403,6 +406,11 @@ def test_a_handover_works_while_simulated_time_stands_still(start, clock, wait_u
     assert stranger.answer().message
 
 
+def is_at(state, now):
+    """Return whether joint states are of a time, or of the last period before it [s]."""
+    return abs(state.header.stamp.sec + 1e-9 * state.header.stamp.nanosec - now) < 0.02
+
+
 def test_a_playback_in_simulated_time_stays_where_it_is_when_the_clock_is_set_back(
     spinning, clock, wait_until
 ):
@@ -412,22 +420,30 @@ def test_a_playback_in_simulated_time_stays_where_it_is_when_the_clock_is_set_ba
     observer, states = Node('observer', namespace='/sim'), []
     observer.create_subscription(JointState, 'joint_states', states.append, 100)
     motions = observer.create_publisher(JointTrajectory, 'joint_trajectory', VOLATILE)
+
+    def advance(times, is_enough):
+        """Set one time after another, each state awaited, until something is so; return it."""
+        for now in times:
+            set_clock(clock, now, wait_until, node)
+            wait_until(lambda now=now: states and is_at(states[-1], now))
+            if is_enough():
+                return now
+        raise AssertionError('the arm does not move')
+
     with spinning(node), spinning(observer):
         wait_until(lambda: motions.get_subscription_count() > 0)
         set_clock(clock, 50.0, wait_until, node)
         there = (np.array(FOLDED) - 0.3).tolist()
-        before = node._playback
         motions.publish(motion(there, 2))
-        wait_until(lambda: node._playback is not before)
-        for k in range(100):
-            set_clock(clock, 50.0 + 0.01 * k, wait_until, node)
-        wait_until(lambda: states and abs(states[-1].position[0] - FOLDED[0]) > 0.05)
+        times = iter(50.0 + 0.01 * np.arange(400))
+        stood_since = advance(times, lambda: abs(states[-1].position[0] - FOLDED[0]) > 0.05)
         n = len(states)
         # While the clock stands still the arm does too.
         for _ in range(20):
-            clock(50.99)
+            clock(stood_since)
         assert len(states) <= n + 3
-        stood = node._playback.state_at(50.99)[0]
+        stood = states[-1].position
+        assert abs(stood[0] - there[0]) > 0.05
         for k in range(1, 100):
             set_clock(clock, 10.0 + 0.01 * k, wait_until, node)
         wait_until(lambda: states[-1].header.stamp.sec == 10)
@@ -436,17 +452,17 @@ def test_a_playback_in_simulated_time_stays_where_it_is_when_the_clock_is_set_ba
         # And it moves again from there.
         back = motion(FOLDED, 2)
         back.points[0].positions = list(states[-1].position)
-        before = node._playback
         motions.publish(back)
-        wait_until(lambda: node._playback is not before)
+        times = iter(11.0 + 0.01 * np.arange(400))
+        advance(times, lambda: abs(states[-1].position[0] - stood[0]) > 0.02)
     node.destroy_node()
     observer.destroy_node()
 
 
-def test_a_plan_keeps_to_the_parameters_of_its_begin(start, monkeypatch):
+def test_a_plan_keeps_to_the_parameters_of_its_begin(start):
     planner, stranger = start(seed=5)
     say_all(planner, stranger)
-    jerks, plan_motion = [], in_process_planner.plan_question
+    jerks, plan_motion = [], stranger.script.plans
 
     def plan_while_it_is_set(question, should_stop):
         if not jerks:
@@ -460,7 +476,7 @@ def test_a_plan_keeps_to_the_parameters_of_its_begin(start, monkeypatch):
         jerks.append(question.limits.jerk[0])
         return plan_motion(question, should_stop)
 
-    monkeypatch.setattr(in_process_planner, 'plan_question', plan_while_it_is_set)
+    stranger.script.plans = plan_while_it_is_set
     # They monitor the motion, too.
     for seed, margin in ((5, 0.02), (6, 0.03)):
         assert stranger.answer().message.split('; ')[0].endswith(f'seed {seed}')
@@ -484,12 +500,12 @@ def test_a_speed_of_rest_holds_from_the_next_joint_state_on(start, wait_until):
 @pytest.mark.parametrize('profile', [LATCHED, VOLATILE])
 def test_the_playback_receives_from_reliable_publishers(spinning, wait_until, profile):
     node, planner = PlaybackNode(namespace='/quality'), Node('planner', namespace='/quality')
-    motions = planner.create_publisher(JointTrajectory, 'joint_trajectory', profile)
+    motions, states = planner.create_publisher(JointTrajectory, 'joint_trajectory', profile), []
+    planner.create_subscription(JointState, 'joint_states', states.append, 10)
     with spinning(node, planner):
         wait_until(lambda: motions.get_subscription_count() > 0)
-        before = node._playback
         motions.publish(motion((np.array(FOLDED) - 0.1).tolist(), 1))
-        wait_until(lambda: node._playback is not before)
+        wait_until(lambda: states and any(states[-1].velocity))
     node.destroy_node()
     planner.destroy_node()
 
@@ -579,8 +595,7 @@ def test_a_planner_that_was_killed_leaves_an_arm_at_rest_and_is_replaced(spinnin
             answer = ask()
             assert answer.success, answer.message
             wait_until(lambda: watcher.speed > 0.02)
-            first._process.kill()
-            first._process.wait()
+            os.kill(first.pid, signal.SIGKILL)
         wait_until(lambda: watcher.speed == 0.0)
         goal = watcher.motions[0].points[-1].positions
         assert np.abs(np.array(watcher.states[-1].position) - goal).max() > 0.1

@@ -21,13 +21,12 @@ from rrth_planner.model.rotation import pose_matrix, rotation_matrix  # noqa: E4
 from rrth_planner.model.status import ErrorCode, PlanStatus  # noqa: E402
 from rrth_planner.model.trajectory import Trajectory  # noqa: E402
 from rrth_planner.requests.answer import answer, CODE_OF_STATUS  # noqa: E402
-from rrth_planner.ros.messages import body as bodies, marker_edits  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.error_codes import code_of_rejection  # noqa: E402
 from rrth_planner.ros.messages.frames import FrameError
 from rrth_planner.ros.messages.goal import goal_from_msg
 from rrth_planner.ros.messages.joint_state import configuration_from_msg, has_joint_of
-from rrth_planner.ros.messages.marker_edits import measured_at, read_edits
+from rrth_planner.ros.messages.marker_edits import measured_at, MOST_BOXES, read_edits
 from rrth_planner.ros.messages.plan_markers import plan_markers
 from rrth_planner.ros.messages.trajectory import (
     joint_trajectory_from_msg,
@@ -226,15 +225,14 @@ def test_an_unknown_frame_is_an_error_of_its_own():
         goal_from_msg(target(frame='camera'), 'torso')
 
 
-def test_more_boxes_than_the_limit_are_rejected(monkeypatch):
-    for module in (bodies, marker_edits):
-        monkeypatch.setattr(module, 'MOST_BOXES', 3)
-    body = body_of(*(box(index=i) for i in range(3)))
-    with pytest.raises(MessageError, match='4 boxes, expected at most 3 in all'):
-        body.apply(array(box(index=3)), 0.0, 'torso')
+def test_more_boxes_than_the_limit_are_rejected():
     many = box()
-    many.type, many.points = Marker.CUBE_LIST, [Point()] * 4
-    with pytest.raises(MessageError, match='points: 4, expected 1 to 3'):
+    many.type, many.points = Marker.CUBE_LIST, [Point()] * MOST_BOXES
+    body = body_of(many)
+    with pytest.raises(MessageError, match='10001 boxes, expected at most 10000 in all'):
+        body.apply(array(box(index=1)), 0.0, 'torso')
+    many.points = [Point()] * (MOST_BOXES + 1)
+    with pytest.raises(MessageError, match='points: 10001, expected 1 to 10000'):
         body_of(many)
 
 

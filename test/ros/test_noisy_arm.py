@@ -35,7 +35,7 @@ ENCODERS = {
 }
 TARGETS = (1.5, 0.1, 0.3), (1.5, 0.5, 0.4)
 # So many requests of each kind.
-N_REQUESTS = {'0.1 mrad': 3, '1 mrad': 10, '4,096 counts': 3}
+N_REQUESTS = {'0.1 mrad': 2, '1 mrad': 6, '4,096 counts': 2}
 # A mean of 31 readings is hardly ever further off [rad], nor is a count.
 OFF, FIRST_OFF = 1.2e-3, 5e-3
 

@@ -3,6 +3,7 @@
 """The planner's parameters: defaults, descriptions, and a sentence for each rejection."""
 
 from dataclasses import fields
+import sys
 
 import pytest
 
@@ -10,7 +11,6 @@ pytest.importorskip('rclpy')
 
 from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
-from rrth_planner.collision import distance_library  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.io.resources import resource_path  # noqa: E402
 from rrth_planner.io.text_file import load_yaml
@@ -140,7 +140,7 @@ def test_a_bad_value_is_rejected_and_changes_nothing(started, name, value, sente
 
 
 def test_a_second_checker_that_is_not_installed_is_rejected_by_name(started, monkeypatch):
-    monkeypatch.setattr(distance_library, 'find_spec', lambda name: None if name == 'coal' else 1)
+    monkeypatch.setitem(sys.modules, 'coal', None)
     node, parameters = started()
     assert parameters.second_checker == 'fcl'
     (result,) = node.set_parameters([Parameter(name='second_checker', value='coal')])

@@ -15,7 +15,6 @@ from rrth_planner.execution import step  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.model.arm import forward_kinematics, tool_pose  # noqa: E402
 from rrth_planner.model.trajectory import positions_at  # noqa: E402
-from rrth_planner.pipeline import in_process_planner  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of  # noqa: E402
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg  # noqa: E402
 from samples import array, box, fenced, FOLDED, JOINTS, wearer  # noqa: E402
@@ -105,10 +104,10 @@ def test_deeper_than_escape_depth_is_rejected(start):
 
 
 @pytest.mark.usefixtures('one_try')
-def test_an_escape_is_revalidated_when_the_wearer_moved(start, monkeypatch, wait_until):
+def test_an_escape_is_revalidated_when_the_wearer_moved(start, wait_until):
     planner, stranger = start()
     say_all(planner, stranger, body_boxes=leaned())
-    inputs, plan_motion = inputs_of(planner), in_process_planner.plan_question
+    inputs, plan_motion = inputs_of(planner), stranger.script.plans
     moves = iter((leaned(), array(*fenced().markers, leaned().markers[-1])))
 
     def plan_while_the_body_changes(*args, **kwargs):
@@ -119,7 +118,7 @@ def test_an_escape_is_revalidated_when_the_wearer_moved(start, monkeypatch, wait
         wait_until(lambda: inputs.body.value is not body)
         return plan
 
-    monkeypatch.setattr(in_process_planner, 'plan_question', plan_while_the_body_changes)
+    stranger.script.plans = plan_while_the_body_changes
     assert stranger.answer().success
     message = stranger.answer().message
     assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
@@ -127,13 +126,11 @@ def test_an_escape_is_revalidated_when_the_wearer_moved(start, monkeypatch, wait
 
 @pytest.mark.usefixtures('one_try')
 @pytest.mark.parametrize(('depth', 'answer'), [(0.05, 'SUCCESS'), (0.028, 'MOTION_PLAN_INVAL')])
-def test_no_escape_is_published_once_the_arm_is_too_deep(
-    start, monkeypatch, wait_until, depth, answer
-):
+def test_no_escape_is_published_once_the_arm_is_too_deep(start, wait_until, depth, answer):
     # It is 0.0275 m deep at first.
     planner, stranger = start(escape_depth=depth)
     say_all(planner, stranger, body_boxes=pressed())
-    inputs, plan_motion = inputs_of(planner), in_process_planner.plan_question
+    inputs, plan_motion = inputs_of(planner), stranger.script.plans
 
     def plan_while_the_wearer_leans(*args, **kwargs):
         plan, body = plan_motion(*args, **kwargs), inputs.body.value
@@ -141,7 +138,7 @@ def test_no_escape_is_published_once_the_arm_is_too_deep(
         wait_until(lambda: inputs.body.value is not body)
         return plan
 
-    monkeypatch.setattr(in_process_planner, 'plan_question', plan_while_the_wearer_leans)
+    stranger.script.plans = plan_while_the_wearer_leans
     assert stranger.answer().message.startswith(answer)
 
 
@@ -151,26 +148,29 @@ def test_both_checkers_check_an_escape_when_the_wearer_moved(
 ):
     planner, stranger = start(incident_folder=str(tmp_path))
     say_all(planner, stranger, body_boxes=leaned())
-    inputs, plan_motion, violations = inputs_of(planner), in_process_planner.plan_question, []
+    inputs, plan_motion, checked = inputs_of(planner), stranger.script.plans, []
 
-    def plan_while_a_box_comes(*args, **kwargs):
-        plan = plan_motion(*args, **kwargs)
+    def plan_while_a_box_comes(*args):
+        plan = plan_motion(*args)
         body = inputs.body.value
         far = box('far', body.n_boxes, center=(0.0, 0.0, -5.0), size=(0.1, 0.1, 0.1))
         stranger.publishers['body_boxes'].publish(array(far))
         wait_until(lambda: inputs.body.value is not body)
-        for violation in violations:
-            monkeypatch.setattr(
-                trajectory_validation, 'first_escape_violation', lambda *_, found=violation: found
-            )
         return plan
 
-    monkeypatch.setattr(in_process_planner, 'plan_question', plan_while_a_box_comes)
+    def check(*args):
+        checked.append(args)
+        return Violation(0.001, 0.01, 'pointing ray', 'hand/0')
+
+    stranger.script.plans = plan_while_a_box_comes
     with monkeypatch.context() as patch:
         patch.setattr(trajectory_validation, 'leads_out', lambda *_: False)
         message = stranger.answer().message
     assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
-    violations.append(Violation(0.001, 0.01, 'pointing ray', 'hand/0'))
+    stranger.script.checks = check
     message = stranger.answer().message
     assert message.startswith('FAILURE (99999): the two collision checks disagree: pointing ray')
     assert not stranger.received['joint_trajectory']
+    # The second one was told how long the escape lasts.
+    ((*_, escape_time),) = checked
+    assert escape_time > 0.0

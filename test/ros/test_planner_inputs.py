@@ -123,23 +123,22 @@ def test_broken_joint_positions_are_not_replaced_by_those_before(start):
     assert stranger.answer().success
 
 
-def test_a_box_whose_lifetime_has_passed_is_named_and_nothing_is_planned(start, monkeypatch):
+def test_a_box_whose_lifetime_has_passed_is_named_and_nothing_is_planned(start):
     planner, stranger = start()
-    warnings = []
-    monkeypatch.setattr(planner.get_logger(), 'warning', warnings.append)
+    logged = stranger.lines(planner)
     body = wearer()
     pack = box('pack', center=(-1.0, 0.0, -1.0), text='a pack')
     pack.lifetime.nanosec = 10**8
     body.markers.append(pack)
     say_all(planner, stranger, body_boxes=body)
     stranger.wait_until(lambda: stranger.value('lost parts') == '"a pack"')
-    stranger.wait_until(lambda: any('lifetime of "a pack"' in line for line in warnings))
+    stranger.wait_until(lambda: any('lifetime of "a pack"' in line for _, line in logged))
     for _ in range(2):
         message = stranger.answer().message
         assert message.startswith('SENSOR_INFO_STALE (-24): the body on'), message
         assert 'has lost parts: ' in message, message
         assert '"a pack"' in message
-    assert sum('lifetime of "a pack"' in line for line in warnings) == 1
+    assert sum('lifetime of "a pack"' in line for _, line in logged) == 1
     assert not stranger.received['joint_trajectory']
     gone = box('pack')
     gone.action = Marker.DELETE
@@ -148,17 +147,16 @@ def test_a_box_whose_lifetime_has_passed_is_named_and_nothing_is_planned(start, 
     assert stranger.answer().success
 
 
-def test_a_second_publisher_of_the_body_is_reported(start, monkeypatch):
+def test_a_second_publisher_of_the_body_is_reported(start):
     planner, stranger = start()
-    warnings = []
-    monkeypatch.setattr(planner.get_logger(), 'warning', warnings.append)
+    logged = stranger.lines(planner)
     say_all(planner, stranger)
     stranger.wait_until(lambda: stranger.value('publishers of the body') == '1')
     other = stranger.node.create_publisher(MarkerArray, 'body_boxes', 10)
     stranger.wait_until(lambda: stranger.value('publishers of the body') == '2')
     stranger.node.destroy_publisher(other)
     stranger.wait_until(lambda: stranger.value('publishers of the body') == '1')
-    (line,) = [line for line in warnings if 'publishers' in line]
+    (line,) = [line for _, line in logged if 'publishers' in line]
     assert 'body_boxes has 2 publishers: for each marker the last edit counts' in line, line
 
 
@@ -190,6 +188,17 @@ def test_a_body_without_a_required_box_is_rejected_until_it_comes(start):
     stranger.wait_until(lambda: stranger.value('age of body at decisions').startswith('1, last '))
 
 
+def readers(planner, topic):
+    """Return the durability of the reliable readers of a topic that the planner has."""
+    found = planner.get_subscriptions_info_by_topic(topic)
+    return [
+        info.qos_profile.durability
+        for info in found
+        if info.node_name == 'rrth_planner'
+        and info.qos_profile.reliability == ReliabilityPolicy.RELIABLE
+    ]
+
+
 @pytest.mark.parametrize('profile', [LATCHED, VOLATILE, BEST_EFFORT])
 def test_publishers_of_every_quality_are_received_once(start, profile):
     planner, stranger = start()
@@ -204,8 +213,9 @@ def test_publishers_of_every_quality_are_received_once(start, profile):
     stranger.wait_until(lambda: all(i.measured is not None for i in inputs.all.values()))
     if profile is not BEST_EFFORT:
         # What the best-effort reader misses comes by another one.
-        subscriptions = planner._scene_monitor._subscriptions
-        stranger.wait_until(lambda: all(profile.durability in h._reliable for h in subscriptions))
+        for name in TOPICS:
+            topic = planner.resolve_topic_name(name)
+            stranger.wait_until(lambda topic=topic: profile.durability in readers(planner, topic))
 
 
 def test_what_was_latched_before_the_start_is_received(start, spinning, wait_until):

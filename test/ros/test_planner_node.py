@@ -6,7 +6,7 @@ import os
 import signal
 import subprocess
 import sys
-from threading import Event, Thread
+from threading import Event
 import time
 
 import numpy as np
@@ -20,14 +20,11 @@ from nav_msgs.srv import GetPlan  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.parameter_client import AsyncParameterClient  # noqa: E402
 from rclpy.task import Future  # noqa: E402
+from requests_alone import _alone  # noqa: E402, F401
 from rrth_planner.execution.command import ahead, BEFORE  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.model.arm import pointing_error  # noqa: E402
-from rrth_planner.model.status import ErrorCode  # noqa: E402
-from rrth_planner.pipeline import in_process_planner  # noqa: E402
 from rrth_planner.pipeline.planning_process import PlanningProcessError  # noqa: E402
-from rrth_planner.requests.outcome import Outcome  # noqa: E402
-from rrth_planner.requests.revalidation import Revalidation  # noqa: E402
 from rrth_planner.ros import planner as planner_module  # noqa: E402
 from rrth_planner.ros.client import planner_client  # noqa: E402
 from rrth_planner.ros.interface.parameters import RULES  # noqa: E402
@@ -199,7 +196,7 @@ def test_a_plan_is_cancelled_with_those_that_wait(start, wait_until):
     planner, stranger = start(**ENDLESS)
     say_all(planner, stranger, body_boxes=fenced())
     running, waiting = stranger.ask('plan'), stranger.ask('plan')
-    wait_until(lambda: len(planner._queue._open) == 2)
+    stranger.await_turn()
     assert stranger.answer('cancel').message == 'SUCCESS (1): requests cancelled: 2'
     wait_until(lambda: running.done() and waiting.done())
     for future in (running, waiting):
@@ -215,7 +212,7 @@ def test_messages_are_received_and_callers_wait_while_it_plans(start, wait_until
     planner, stranger = start(**ENDLESS)
     say_all(planner, stranger, body_boxes=fenced())
     first = stranger.ask('plan')
-    wait_until(lambda: len(planner._queue._open) == 1)
+    stranger.await_turn()
     for k in range(20):
         stranger.publishers['target'].publish(target(1.4, 0.01 * k, 0.2))
         wait_until(lambda k=k: inputs_of(planner).target.value.target[1] == 0.01 * k)
@@ -230,16 +227,17 @@ def test_messages_are_received_and_callers_wait_while_it_plans(start, wait_until
     assert all(f.result().success for f in futures)
 
 
-def test_whatever_goes_wrong_is_answered(start, monkeypatch, tmp_path):
+def test_whatever_goes_wrong_is_answered(start, tmp_path):
     planner, stranger = start(incident_folder=str(tmp_path))
     say_all(planner, stranger)
+    plan_question = stranger.script.plans
 
-    def fail(*_, **__):
+    def fail(*_):
+        stranger.script.plans = plan_question
         raise ZeroDivisionError('of a test')
 
-    with monkeypatch.context() as patch:
-        patch.setattr(in_process_planner, 'plan_question', fail)
-        message = stranger.answer().message
+    stranger.script.plans = fail
+    message = stranger.answer().message
     sentence = 'FAILURE (99999): planning failed unexpectedly: ZeroDivisionError: of a test; '
     (file,) = tmp_path.glob('incident-*')
     assert message == f'{sentence}to replay it: ./run exec replay {file}; answer 1'
@@ -247,16 +245,17 @@ def test_whatever_goes_wrong_is_answered(start, monkeypatch, tmp_path):
     assert stranger.answer().success
 
 
-def test_a_planning_process_that_dies_is_an_answer_and_no_end(start, monkeypatch, tmp_path):
+def test_a_planning_process_that_dies_is_an_answer_and_no_end(start, tmp_path):
     planner, stranger = start(incident_folder=str(tmp_path))
     say_all(planner, stranger)
+    plan_question = stranger.script.plans
 
     def die(*_):
+        stranger.script.plans = plan_question
         raise PlanningProcessError('the planning process ended with code -9 while working')
 
-    with monkeypatch.context() as patch:
-        patch.setattr(planner._planner, 'plan', die)
-        message = stranger.answer().message
+    stranger.script.plans = die
+    message = stranger.answer().message
     assert message.startswith('FAILURE (99999): planning failed unexpectedly: PlanningProcessErr')
     assert 'ended with code -9' in message
     # What was asked is kept, to be asked again.
@@ -265,55 +264,36 @@ def test_a_planning_process_that_dies_is_an_answer_and_no_end(start, monkeypatch
     assert stranger.answer().success
 
 
-def test_what_was_cancelled_is_never_published(start, monkeypatch):
-    planner, stranger = start()
-    say_all(planner, stranger)
-    queue, disagreement = planner._queue, Revalidation.disagreement
-    ended = []
-
-    async def cancel_after_the_revalidation(*args):
-        found = await disagreement(*args)
-        ended.append(queue.cancel())
-        return found
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Revalidation, 'disagreement', cancel_after_the_revalidation)
-        message = stranger.answer().message
+def test_what_was_cancelled_is_never_published(alone):
+    one, ended = alone(), []
+    # After the revalidation.
+    one.host.on_read = lambda: ended.append(one.queue.cancel())
+    assert one.answer().text == 'PREEMPTED (-7): the request was cancelled; answer 1'
     assert ended == [1]
-    assert message == 'PREEMPTED (-7): the request was cancelled; answer 1'
-    assert not stranger.received['joint_trajectory']
-    assert stranger.answer().success
-    stranger.wait_until(lambda: len(stranger.received['joint_trajectory']) == 1)
+    assert not one.publishers.motions
+    one.host.on_read = lambda: None
+    assert one.answer().trajectory is not None
+    assert len(one.publishers.motions) == 1
 
 
-def test_a_cancel_does_not_count_what_was_published(start, monkeypatch):
-    planner, stranger = start()
-    say_all(planner, stranger)
-    queue, ended = planner._queue, []
-    publishers = planner._motions
-    publish = publishers.publish_view
-
-    def cancel_first(*args):
-        ended.append(queue.cancel())
-        return publish(*args)
-
-    monkeypatch.setattr(publishers, 'publish_view', cancel_first)
-    assert stranger.answer().success
-    stranger.wait_until(lambda: ended)
+def test_a_cancel_does_not_count_what_was_published(alone):
+    one, ended = alone(), []
+    one.publishers.on_view = lambda: ended.append(one.queue.cancel())
+    assert one.answer().trajectory is not None
+    one.run_until(lambda: ended)
     assert ended == [0]
 
 
-def test_a_request_is_answered_before_its_motion_is_shown(start, monkeypatch):
+def test_a_request_is_answered_before_its_motion_is_shown(start):
     planner, stranger = start()
     say_all(planner, stranger)
-    publishers, is_answered = planner._motions, Event()
-    publish = publishers.publish_view
+    is_answered = Event()
 
-    def show_late(*args):
-        assert is_answered.wait(30.0)
-        publish(*args)
+    def show_late(topic, msg, send):
+        assert topic != 'markers' or is_answered.wait(30.0)
+        send(msg)
 
-    monkeypatch.setattr(publishers, 'publish_view', show_late)
+    stranger.script.sends = show_late
     assert stranger.answer().success
     stranger.wait_until(lambda: stranger.received['joint_trajectory'])
     assert not stranger.received['rrth_planner/markers']
@@ -321,52 +301,45 @@ def test_a_request_is_answered_before_its_motion_is_shown(start, monkeypatch):
     stranger.wait_until(lambda: stranger.received['rrth_planner/markers'])
 
 
-def test_an_error_in_showing_a_motion_does_not_revoke_it(start, monkeypatch):
+def test_an_error_in_showing_a_motion_does_not_revoke_it(start):
     planner, stranger = start()
     say_all(planner, stranger)
+    failed = []
 
-    def fail(*args):
-        raise RuntimeError('no colours')
+    def fail_to_show(topic, msg, send):
+        if topic == 'markers':
+            failed.append(msg)
+            raise RuntimeError('no colours')
+        send(msg)
 
-    monkeypatch.setattr(planner._motions, 'publish_view', fail)
-    for _ in range(2):
+    stranger.script.sends = fail_to_show
+    for n in range(2):
         assert stranger.answer().success
+        stranger.wait_until(lambda n=n: len(failed) == n + 1)
 
 
-def test_nothing_is_published_once_the_node_closes(start, monkeypatch):
+def test_nothing_is_published_once_the_node_closes(alone):
+    one = alone()
+    # After the revalidation.
+    one.host.on_read = one.queue.close
+    assert one.answer().text.startswith('PREEMPTED (-7): ')
+    assert not one.publishers.motions
+
+
+def test_a_new_algorithm_is_warmed_up_before_the_next_request(start):
     planner, stranger = start()
     say_all(planner, stranger)
-    queue, disagreement = planner._queue, Revalidation.disagreement
-    closers = []
-
-    async def close_after_the_revalidation(*args):
-        found = await disagreement(*args)
-        closers.append(Thread(target=queue.close))
-        closers[0].start()
-        stranger.wait_until(lambda: queue._is_closed)
-        return found
-
-    monkeypatch.setattr(Revalidation, 'disagreement', close_after_the_revalidation)
-    assert stranger.answer().message.startswith('PREEMPTED (-7): ')
-    closers[0].join(30.0)
-    assert not stranger.received['joint_trajectory']
-
-
-def test_a_new_algorithm_is_warmed_up_before_the_next_request(start, monkeypatch):
-    planner, stranger = start()
-    say_all(planner, stranger)
-    order, plan_motion = [], in_process_planner.plan_question
+    order, plan_question = [], stranger.script.plans
 
     def warm_up(_, options, __):
         time.sleep(0.2)
         order.append(type(options).__name__)
 
-    def plan_in_turn(*args, **kwargs):
+    def plan_in_turn(*question):
         order.append('plan')
-        return plan_motion(*args, **kwargs)
+        return plan_question(*question)
 
-    monkeypatch.setattr(planner._planner, 'warm_up', warm_up)
-    monkeypatch.setattr(in_process_planner, 'plan_question', plan_in_turn)
+    stranger.script.warms_up, stranger.script.plans = warm_up, plan_in_turn
     planner.set_parameters([Parameter(name='margin', value=0.03)])
     planner.set_parameters([Parameter(name='algorithm', value='rrt')])
     assert stranger.answer().success
@@ -398,26 +371,27 @@ def test_diagnostics_bear_the_name_of_the_node_and_keep_to_10_hz(start):
     stranger.wait_until(lambda: arrays)
     name = planner.get_fully_qualified_name()[1:]
     assert arrays[-1].status[0].name == f'{name}: planning'
-    begin, n_before = time.monotonic(), len(arrays)
+    begin, n_before, n_asked = time.monotonic(), len(arrays), 0
+    request = GetPlan.Request()
     while time.monotonic() < begin + 1.0:
-        planner._reporter.publish()
-        time.sleep(0.005)
+        n_asked += 1
+        request.start.header.frame_id = f'frame_{n_asked}'
+        stranger.answer('get_plan', request)
+    # Each of them is a change.
+    assert n_asked > 30
     assert 5 <= len(arrays) - n_before <= 13
-    planner._reporter.conclude(Outcome(ErrorCode.FAILURE, 'the last'))
-    stranger.wait_until(lambda: stranger.value('last sentence') == 'the last', 0.9)
+    stranger.wait_until(lambda: f'"frame_{n_asked}"' in stranger.value('last sentence'), 0.9)
 
 
 def test_the_same_seed_gives_the_same_trajectory(start):
-    planner, stranger = start(seed=7, improve_time=0.0)
-    say_all(planner, stranger)
-    assert stranger.answer().success
-    # The arm does not execute it: then it is taken to be held where it rests.
-    stranger.wait_until(lambda: planner._monitor.hold(-np.inf) is None)
-    assert stranger.answer().success
-    stranger.wait_until(lambda: len(stranger.received['joint_trajectory']) == 2)
-    one, other = (
-        joint_trajectory_from_msg(msg, JOINTS) for msg in stranger.received['joint_trajectory']
-    )
+    motions = []
+    for _ in range(2):
+        planner, stranger = start(seed=7, improve_time=0.0)
+        say_all(planner, stranger)
+        assert stranger.answer().success
+        stranger.wait_until(lambda s=stranger: s.received['joint_trajectory'])
+        motions.append(stranger.received['joint_trajectory'][-1])
+    one, other = (joint_trajectory_from_msg(msg, JOINTS) for msg in motions)
     # How long each rests before it begins is up to the clock.
     for values in zip(one.states, other.states, strict=True):
         np.testing.assert_array_equal(*values)

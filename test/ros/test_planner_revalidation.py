@@ -18,7 +18,6 @@ from rrth_planner.io.incident_file import read_incident  # noqa: E402
 from rrth_planner.model.arm import tool_pose  # noqa: E402
 from rrth_planner.model.scene import Box, Scene  # noqa: E402
 from rrth_planner.model.trajectory import positions_at  # noqa: E402
-from rrth_planner.pipeline import in_process_planner  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of  # noqa: E402
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg  # noqa: E402
 from rrth_planner.ros.requests import node_host  # noqa: E402
@@ -29,10 +28,10 @@ from visualization_msgs.msg import Marker  # noqa: E402
 pytestmark = pytest.mark.usefixtures('ros_context')
 
 
-def test_a_request_is_planned_again_while_the_wearer_moves(start, monkeypatch, wait_until):
+def test_a_request_is_planned_again_while_the_wearer_moves(start, wait_until):
     planner, stranger = start()
     say_all(planner, stranger)
-    inputs, plan_motion, plans = inputs_of(planner), in_process_planner.plan_question, []
+    inputs, plan_motion, plans = inputs_of(planner), stranger.script.plans, []
 
     def plan_while_a_hand_comes(*args, **kwargs):
         plan, body = plan_motion(*args, **kwargs), inputs.body.value
@@ -45,7 +44,7 @@ def test_a_request_is_planned_again_while_the_wearer_moves(start, monkeypatch, w
             wait_until(lambda: inputs.body.value is not body)
         return plan
 
-    monkeypatch.setattr(in_process_planner, 'plan_question', plan_while_a_hand_comes)
+    stranger.script.plans = plan_while_a_hand_comes
     assert stranger.answer().success
     assert len(plans) == 2
     stranger.wait_until(lambda: stranger.received['joint_trajectory'])
@@ -55,11 +54,11 @@ def test_a_request_is_planned_again_while_the_wearer_moves(start, monkeypatch, w
 
 
 def test_a_wearer_who_always_moves_into_the_motion_is_reported_after_the_time_limit(
-    start, monkeypatch, wait_until
+    start, wait_until
 ):
     planner, stranger = start(time_limit=0.5)
     say_all(planner, stranger)
-    inputs, plan_motion, n = inputs_of(planner), in_process_planner.plan_question, []
+    inputs, plan_motion, n = inputs_of(planner), stranger.script.plans, []
 
     def plan_while_the_wearer_moves(question, *args):
         # Each motion is planned round the wearer, and invalid for the fence that comes.
@@ -72,25 +71,25 @@ def test_a_wearer_who_always_moves_into_the_motion_is_reported_after_the_time_li
         return plan
 
     open_scene = scene_of(inputs.body.value)
-    monkeypatch.setattr(in_process_planner, 'plan_question', plan_while_the_wearer_moves)
+    stranger.script.plans = plan_while_the_wearer_moves
     message = stranger.answer().message
     assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
     assert len(n) > 1
     assert not stranger.received['joint_trajectory']
 
 
-def test_a_motion_that_begins_elsewhere_is_not_published(start, monkeypatch, tmp_path):
+def test_a_motion_that_begins_elsewhere_is_not_published(start, tmp_path):
     planner, stranger = start(incident_folder=str(tmp_path))
     say_all(planner, stranger)
-    plan_question = in_process_planner.plan_question
+    plan_question = stranger.script.plans
 
     def plan_from_elsewhere(question, should_stop):
+        stranger.script.plans = plan_question
         q = question.q_start + [0.01, 0.0, 0.0, 0.0]
         return plan_question(replace(question, q_start=q), should_stop)
 
-    with monkeypatch.context() as patch:
-        patch.setattr(in_process_planner, 'plan_question', plan_from_elsewhere)
-        message = stranger.answer().message
+    stranger.script.plans = plan_from_elsewhere
+    message = stranger.answer().message
     assert message.startswith('FAILURE')
     assert 'begins 0.0100 rad from the start that was asked for' in message
     assert not stranger.received['joint_trajectory']
@@ -111,11 +110,11 @@ def test_a_motion_that_begins_elsewhere_is_not_published(start, monkeypatch, tmp
     ],
 )
 def test_a_plan_for_what_is_no_longer_there_is_not_published(
-    start, monkeypatch, wait_until, topic, msg, sentence
+    start, wait_until, topic, msg, sentence
 ):
     planner, stranger = start()
     say_all(planner, stranger)
-    inputs, plan_motion = inputs_of(planner), in_process_planner.plan_question
+    inputs, plan_motion = inputs_of(planner), stranger.script.plans
 
     def plan_while_things_move(*args, **kwargs):
         plan = plan_motion(*args, **kwargs)
@@ -124,7 +123,7 @@ def test_a_plan_for_what_is_no_longer_there_is_not_published(
         wait_until(lambda: inputs.body.value is not body or inputs.joints.value is not positions)
         return plan
 
-    monkeypatch.setattr(in_process_planner, 'plan_question', plan_while_things_move)
+    stranger.script.plans = plan_while_things_move
     message = stranger.answer().message
     code = 'MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): '
     assert message.startswith(code if topic == 'body_boxes' else 'START_STATE_INVALID (-26): ')
@@ -143,19 +142,13 @@ def test_a_plan_for_what_is_no_longer_there_is_not_published(
     ],
 )
 @pytest.mark.parametrize('is_checked', [False, True])
-def test_what_came_but_was_not_read_yet_counts(
-    start, monkeypatch, wait_until, is_checked, topic, msg, answer
-):
+def test_what_came_but_was_not_read_yet_counts(start, wait_until, is_checked, topic, msg, answer):
     planner, stranger = start()
     say_all(planner, stranger)
-    owner = planner._planner if is_checked else in_process_planner
-    step = 'violation_seen' if is_checked else 'plan_question'
-    original, plan_question = getattr(owner, step), in_process_planner.plan_question
+    plan_question, violation_seen = stranger.script.plans, stranger.script.checks
     inputs = inputs_of(planner)
 
-    def work_while_the_node_is_busy(*args, **kwargs):
-        monkeypatch.setattr(owner, step, original)
-        result = original(*args, **kwargs)
+    def be_busy(result):
         begun, end = Event(), Event()
         planner.executor.create_task(lambda: begun.set() or end.wait(10.0))
         assert begun.wait(10.0)
@@ -163,18 +156,27 @@ def test_what_came_but_was_not_read_yet_counts(
         Timer(0.3, end.set).start()
         return result
 
-    def plan_while_the_wearer_moves(*args, **kwargs):
+    def plan_while_the_node_is_busy(*args):
+        stranger.script.plans = plan_question
+        return be_busy(plan_question(*args))
+
+    def check_while_the_node_is_busy(*args):
+        stranger.script.checks = violation_seen
+        return be_busy(violation_seen(*args))
+
+    def plan_while_the_wearer_moves(*args):
         # The second checker is asked only where the wearer has moved.
-        monkeypatch.setattr(in_process_planner, 'plan_question', plan_question)
-        plan, body, moved = plan_question(*args, **kwargs), inputs.body.value, wearer()
+        stranger.script.plans = plan_question
+        plan, body, moved = plan_question(*args), inputs.body.value, wearer()
         moved.markers[-1].pose.position.z -= 1e-4
         stranger.publishers['body_boxes'].publish(moved)
         wait_until(lambda: inputs.body.value is not body)
         return plan
 
+    stranger.script.plans = plan_while_the_node_is_busy
     if is_checked:
-        monkeypatch.setattr(in_process_planner, 'plan_question', plan_while_the_wearer_moves)
-    monkeypatch.setattr(owner, step, work_while_the_node_is_busy)
+        stranger.script.plans = plan_while_the_wearer_moves
+        stranger.script.checks = check_while_the_node_is_busy
     response = stranger.answer()
     assert not response.success
     assert answer in response.message
@@ -184,12 +186,12 @@ def test_what_came_but_was_not_read_yet_counts(
 @pytest.mark.usefixtures('one_try')
 @pytest.mark.parametrize('is_in_the_way', [True, False])
 def test_a_body_that_comes_while_a_motion_is_checked_is_checked_too(
-    start, monkeypatch, wait_until, is_in_the_way
+    start, wait_until, is_in_the_way
 ):
     planner, stranger = start()
     say_all(planner, stranger)
-    inputs, plan_question = inputs_of(planner), in_process_planner.plan_question
-    violation_seen, checked = planner._planner.violation_seen, []
+    inputs, plan_question = inputs_of(planner), stranger.script.plans
+    violation_seen, checked = stranger.script.checks, []
 
     def come(body):
         before = inputs.body.value
@@ -212,8 +214,8 @@ def test_a_body_that_comes_while_a_motion_is_checked_is_checked_too(
         come(fenced() if is_in_the_way else moved(2e-4))
         return found
 
-    monkeypatch.setattr(in_process_planner, 'plan_question', plan_while_a_body_comes)
-    monkeypatch.setattr(planner._planner, 'violation_seen', check_while_a_body_comes)
+    stranger.script.plans = plan_while_a_body_comes
+    stranger.script.checks = check_while_a_body_comes
     message = stranger.answer().message
     # The proof alone decides about that one, and about those that follow.
     assert len(checked) == 1
@@ -221,22 +223,22 @@ def test_a_body_that_comes_while_a_motion_is_checked_is_checked_too(
     assert bool(stranger.received['joint_trajectory']) == (not is_in_the_way)
 
 
-def test_no_message_is_processed_while_a_motion_is_published(start, monkeypatch):
+def test_no_message_is_processed_while_a_motion_is_published(start):
     planner, stranger = start()
     say_all(planner, stranger)
-    inputs, publishers = inputs_of(planner), planner._queue._publishers
-    publish, known, planned = publishers.publish_motion, [], []
+    inputs, known, planned = inputs_of(planner), [], []
 
-    def publish_slowly(trajectory, parameters, begin):
-        if not planned:
-            body = inputs.body.value
-            stranger.publishers['body_boxes'].publish(fenced())
-            time.sleep(0.3)
-            known.append(inputs.body.value is body)
-        planned.append(publishers.motion(trajectory, parameters, begin))
-        publish(trajectory, parameters, begin)
+    def send_slowly(topic, msg, send):
+        if topic == 'joint_trajectory':
+            if not planned:
+                body = inputs.body.value
+                stranger.publishers['body_boxes'].publish(fenced())
+                time.sleep(0.3)
+                known.append(inputs.body.value is body)
+            planned.append(msg)
+        send(msg)
 
-    monkeypatch.setattr(publishers, 'publish_motion', publish_slowly)
+    stranger.script.sends = send_slowly
     assert stranger.answer().success
     assert known[0]
     # Then it is, and the monitor stops the arm. Of messages that quick only the last may arrive.
@@ -244,10 +246,10 @@ def test_no_message_is_processed_while_a_motion_is_published(start, monkeypatch)
     stranger.wait_until(lambda: received and received[-1].points[-1] != motion.points[-1])
 
 
-def test_both_checkers_are_asked_when_the_wearer_moved(start, monkeypatch, wait_until, tmp_path):
+def test_both_checkers_are_asked_when_the_wearer_moved(start, wait_until, tmp_path):
     planner, stranger = start(incident_folder=str(tmp_path))
     say_all(planner, stranger)
-    inputs, plan_motion = inputs_of(planner), in_process_planner.plan_question
+    inputs, plan_motion = inputs_of(planner), stranger.script.plans
     asked = []
 
     def plan_while_a_box_comes(*args, **kwargs):
@@ -262,8 +264,8 @@ def test_both_checkers_are_asked_when_the_wearer_moved(start, monkeypatch, wait_
         asked.append(args)
         return Violation(0.1, 0.01, 'ray', 'torso') if len(asked) == 1 else None
 
-    monkeypatch.setattr(in_process_planner, 'plan_question', plan_while_a_box_comes)
-    monkeypatch.setattr(planner._planner, 'violation_seen', disagree)
+    stranger.script.plans = plan_while_a_box_comes
+    stranger.script.checks = disagree
     message = stranger.answer().message
     assert message.startswith('FAILURE (99999): the two collision checks disagree: ray is 0.0100')
     assert not stranger.received['joint_trajectory']
@@ -310,7 +312,7 @@ def test_a_node_that_cannot_read_all_that_came_publishes_no_motion(start, monkey
     monkeypatch.setattr(node_host, 'SLICE', 0.0)
     planner, stranger = start()
     say_all(planner, stranger)
-    plan_question = in_process_planner.plan_question
+    plan_question = stranger.script.plans
 
     def plan_while_the_node_is_busy(*args, **kwargs):
         plan = plan_question(*args, **kwargs)
@@ -322,7 +324,7 @@ def test_a_node_that_cannot_read_all_that_came_publishes_no_motion(start, monkey
         Timer(0.3, end.set).start()
         return plan
 
-    monkeypatch.setattr(in_process_planner, 'plan_question', plan_while_the_node_is_busy)
+    stranger.script.plans = plan_while_the_node_is_busy
     message = stranger.answer().message
     assert message.startswith('SENSOR_INFO_STALE (-24): the node is busy')
     assert not stranger.received['joint_trajectory']

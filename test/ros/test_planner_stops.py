@@ -3,7 +3,6 @@
 """The planner's node where the arm moves, or was stopped: handovers, and plans after a stop."""
 
 from itertools import pairwise
-import time
 
 import numpy as np
 import pytest
@@ -12,16 +11,15 @@ pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 
 from monitored import know  # noqa: E402
-from nav_msgs.srv import GetPlan  # noqa: E402
+from requests_alone import _alone  # noqa: E402, F401
 from rrth_planner.execution.watch import Stop  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.model.arm import pointing_error  # noqa: E402
+from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.scene import Scene  # noqa: E402
-from rrth_planner.model.status import ErrorCode  # noqa: E402
+from rrth_planner.model.status import PlanStatus  # noqa: E402
 from rrth_planner.model.trajectory import Trajectory  # noqa: E402
-from rrth_planner.pipeline import in_process_planner  # noqa: E402
-from rrth_planner.requests import request_queue  # noqa: E402
-from rrth_planner.requests.outcome import Outcome  # noqa: E402
+from rrth_planner.pipeline.motion_plan import MotionPlan  # noqa: E402
 from samples import fenced, FOLDED, joints  # noqa: E402
 from stranger import _one_try, _start, inputs_of, say_all  # noqa: E402, F401
 
@@ -65,170 +63,158 @@ def test_there_is_no_handover_of_an_arm_above_its_limits(start):
     )
 
 
-def test_nothing_is_published_when_the_arm_begins_to_move(start, monkeypatch, wait_until):
+def test_nothing_is_published_when_the_arm_begins_to_move(start, wait_until):
     planner, stranger = start()
     say_all(planner, stranger)
-    source, plan_motion = inputs_of(planner).joints, in_process_planner.plan_question
+    source, plan_question = inputs_of(planner).joints, stranger.script.plans
 
-    def plan_while_it_starts(*args, **kwargs):
-        plan = plan_motion(*args, **kwargs)
+    def plan_while_it_starts(*question):
+        plan = plan_question(*question)
         stranger.publishers['joint_states'].publish(joints(velocity=[0.0, 0.3, 0.0, 0.0]))
         wait_until(lambda: source.value.velocities[1] == 0.3)
         return plan
 
-    monkeypatch.setattr(in_process_planner, 'plan_question', plan_while_it_starts)
+    stranger.script.plans = plan_while_it_starts
     message = stranger.answer().message
     assert message.startswith('START_STATE_INVALID (-26): joint_2 moves at 0.300 rad/s')
     assert not stranger.received['joint_trajectory']
 
 
-def stop_for(planner, scene=None):
+def stop_for(one, scene=None):
     """
     Have a stop of the arm, which was moving to the target, replanned; it is over.
 
     scene: the wearer that it was proven free of, if it was.
     """
-    goal, parameters = inputs_of(planner).target.value, planner._reporter.parameters
     still = np.zeros((1, 4))
     over = Trajectory(times=[0.0], positions=[FOLDED], velocities=still, accelerations=still)
-    monitor = planner._monitor
-    stop = Stop(over, goal, parameters, scene, True, monitor.watch.n_motions)
-    # In the thread that also decides.
-    planner.executor.create_task(know, monitor, stops=(*monitor.watch.stops, stop))
+    watch = one.monitor.watch
+    stop = Stop(over, one.goal, one.reporter.parameters, scene, True, watch.n_motions)
+    know(one.monitor, stops=(*watch.stops, stop))
+    # It is taken up.
+    one.step()
 
 
-def test_after_a_stop_it_plans_again_from_where_the_arm_has_come_to_rest(start, monkeypatch):
-    monkeypatch.setattr(request_queue, 'LONGEST_SETTLING', 30.0)
-    planner, stranger = start()
-    say_all(planner, stranger, joint_states=joints(velocity=[0.0, 0.3, 0.0, 0.0]))
-    stop_for(planner)
+MOVING = joints(velocity=[0.0, 0.3, 0.0, 0.0])
+
+
+def test_after_a_stop_it_plans_again_from_where_the_arm_has_come_to_rest(alone):
+    one = alone()
+    one.read(MOVING)
+    stop_for(one)
     # Time enough for a plan that does not wait for rest.
-    time.sleep(0.2)
-    stranger.publishers['joint_states'].publish(joints([0.1, *FOLDED[1:]]))
-    stranger.wait_until(lambda: stranger.received['joint_trajectory'])
-    (msg,) = stranger.received['joint_trajectory']
-    assert list(msg.points[0].positions) == [0.1, *FOLDED[1:]]
-    assert not any(msg.points[0].velocities)
-    error = pointing_error(load_arm(), np.array(msg.points[-1].positions), [1.5, 0.1, 0.3])
-    assert error < 1e-6
+    one.run_for(0.2)
+    assert not one.publishers.motions
+    one.stream(joints([0.1, *FOLDED[1:]]))
+    one.run_until(lambda: one.publishers.motions)
+    ((motion, _),) = one.publishers.motions
+    assert list(motion.positions[0]) == [0.1, *FOLDED[1:]]
+    assert not motion.velocities[0].any()
+    assert pointing_error(load_arm(), motion.positions[-1], one.goal.target) < 1e-6
 
 
 @pytest.mark.parametrize('is_free', [True, False])
 def test_from_a_stop_that_is_proven_free_it_plans_before_the_arm_rests_and_once_it_does(
-    start, monkeypatch, is_free
+    alone, is_free
 ):
-    monkeypatch.setattr(request_queue, 'LONGEST_SETTLING', 30.0)
-    planner, stranger = start()
-    say_all(planner, stranger, joint_states=joints(velocity=[0.0, 0.3, 0.0, 0.0]))
-    tried = []
+    one, tried = alone(), []
 
-    async def plan_in_vain(*_):
-        tried.append(bool(inputs_of(planner).joints.value.velocities.any()))
-        return Outcome(ErrorCode.PLANNING_FAILED, 'of the test')
+    def plan_in_vain(question, _):
+        tried.append(question.moving is not None)
+        return MotionPlan(
+            status=PlanStatus.SAMPLE_LIMIT, sentence='of the test', seed=0, planning_time=0.0
+        )
 
-    monkeypatch.setattr(request_queue, 'plan_request', plan_in_vain)
-    monkeypatch.setattr(planner._planner, 'violation_seen', lambda *_: None)
-    stop_for(planner, Scene(()) if is_free else None)
+    one.script.plans, one.script.checks = plan_in_vain, lambda *_: None
+    one.read(MOVING)
+    stop_for(one, Scene(()) if is_free else None)
     if is_free:
-        stranger.wait_until(lambda: tried)
-    time.sleep(0.2)
+        one.run_until(lambda: tried)
+    one.run_for(0.2)
     assert tried == [True] * is_free
     # The arm holds only where it rests.
-    assert stranger.value('monitor') != 'holding'
-    stranger.publishers['joint_states'].publish(joints([0.1, *FOLDED[1:]]))
-    stranger.wait_until(lambda: len(tried) > is_free)
+    assert one.reporter.monitor_state[0] != 'holding'
+    one.stream(joints([0.1, *FOLDED[1:]]))
+    one.run_until(lambda: len(tried) > is_free)
     assert not tried[is_free]
-    stranger.wait_until(lambda: stranger.value('monitor') == 'holding')
+    one.run_until(lambda: one.reporter.monitor_state[0] == 'holding')
 
 
-def test_a_plan_from_before_a_stop_is_not_published(start, monkeypatch):
-    planner, stranger = start()
-    say_all(planner, stranger)
-    plan_motion = in_process_planner.plan_question
+def test_a_plan_from_before_a_stop_is_not_published(alone):
+    one = alone(time_limit=0.3)
+    plan_question = one.script.plans
 
-    def plan_while_the_arm_is_stopped(*args, **kwargs):
-        know(planner._monitor, n_stops=planner._monitor.watch.n_stops + 1)
-        return plan_motion(*args, **kwargs)
+    def plan_while_the_arm_is_stopped(*question):
+        know(one.monitor, n_stops=one.monitor.watch.n_stops + 1)
+        return plan_question(*question)
 
-    with monkeypatch.context() as patch:
-        patch.setattr(in_process_planner, 'plan_question', plan_while_the_arm_is_stopped)
-        message = stranger.answer().message
-    assert message.startswith(
+    one.script.plans = plan_while_the_arm_is_stopped
+    assert one.answer().text.startswith(
         'MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the arm was stopped while its motion'
     )
-    assert not stranger.received['joint_trajectory']
-    assert stranger.answer().success
+    assert not one.publishers.motions
+    one.script.plans = plan_question
+    assert one.answer().trajectory is not None
 
 
-def test_a_request_from_before_an_error_moves_no_arm_after_it(start, monkeypatch):
-    planner, stranger = start()
-    say_all(planner, stranger)
-    plan_motion, errors = in_process_planner.plan_question, ['the monitor failed']
+def test_a_request_from_before_an_error_moves_no_arm_after_it(alone):
+    one = alone()
+    plan_question = one.script.plans
 
-    def plan_while_the_monitor_fails(*args, **kwargs):
-        if errors:
-            # As `fail` of a motion in progress.
-            monitor = planner._monitor
-            known = {'n_stops': monitor.watch.n_stops + 1, 'n_faults': monitor.watch.n_faults + 1}
-            know(monitor, **known, stop_reason=errors.pop())
-        return plan_motion(*args, **kwargs)
+    def plan_while_the_monitor_fails(*question):
+        one.script.plans, watch = plan_question, one.monitor.watch
+        # As `fail` of a motion in progress.
+        known = {'n_stops': watch.n_stops + 1, 'n_faults': watch.n_faults + 1}
+        know(one.monitor, **known, stop_reason='the monitor failed')
+        return plan_question(*question)
 
-    with monkeypatch.context() as patch:
-        patch.setattr(in_process_planner, 'plan_question', plan_while_the_monitor_fails)
-        message = stranger.answer().message
-    assert message.startswith('FAILURE (99999): an error while the motion was planned: the monit')
-    assert not errors
-    assert not stranger.received['joint_trajectory']
-    assert stranger.answer().success
+    one.script.plans = plan_while_the_monitor_fails
+    text = one.answer().text
+    assert text.startswith('FAILURE (99999): an error while the motion was planned: the monit')
+    assert not one.publishers.motions
+    assert one.answer().trajectory is not None
 
 
-def test_after_a_stop_it_plans_for_nothing_once_another_motion_has_begun(start, monkeypatch):
-    monkeypatch.setattr(request_queue, 'LONGEST_SETTLING', 30.0)
-    planner, stranger = start()
-    say_all(planner, stranger, joint_states=joints(velocity=[0.0, 0.3, 0.0, 0.0]))
-    stop_for(planner)
-    stranger.wait_until(lambda: planner._queue._open)
-    know(planner._monitor, n_motions=planner._monitor.watch.n_motions + 1)
-    stranger.publishers['joint_states'].publish(joints())
-    stranger.wait_until(lambda: not planner._queue._open)
-    assert planner._reporter.n_requests == 0
-    assert not planner._queue._open
+def test_after_a_stop_it_plans_for_nothing_once_another_motion_has_begun(alone):
+    one = alone()
+    one.read(MOVING)
+    stop_for(one)
+    assert one.queue.pursues(one.goal)
+    know(one.monitor, n_motions=one.monitor.watch.n_motions + 1)
+    one.read(joints())
+    one.run_until(lambda: not one.queue.pursues(one.goal))
+    one.run_for(0.1)
+    assert one.reporter.n_requests == 0
 
 
-def test_a_request_does_not_wait_for_the_rest_of_an_arm_that_was_stopped(start, monkeypatch):
-    monkeypatch.setattr(request_queue, 'LONGEST_SETTLING', 300.0)
-    planner, stranger = start()
-    say_all(planner, stranger)
+def test_a_request_does_not_wait_for_the_rest_of_an_arm_that_was_stopped(alone):
+    one = alone()
     # No joint state comes that would show it at rest.
-    stop_for(planner)
-    assert stranger.answer().success
-    # It is reported once it has been answered.
-    stranger.wait_until(lambda: planner._reporter.n_requests == 1)
-    stranger.wait_until(lambda: not planner._queue._open)
+    stop_for(one)
+    assert one.queue.pursues(one.goal)
+    assert one.answer().trajectory is not None
+    one.run_until(lambda: not one.queue.pursues(one.goal))
+    assert one.reporter.n_requests == 1
 
 
-def test_a_request_without_a_motion_leaves_the_plan_after_a_stop_to_be_made(start, monkeypatch):
-    monkeypatch.setattr(request_queue, 'LONGEST_SETTLING', 300.0)
-    planner, stranger = start()
-    say_all(planner, stranger)
-    queue = planner._queue
-    stop_for(planner)
-    stranger.wait_until(lambda: queue._open)
-    rejected = stranger.answer('get_plan', GetPlan.Request()).plan
-    assert not rejected.poses
-    assert not stranger.received['joint_trajectory']
-    assert len(queue._open) == 1
-    stranger.publishers['joint_states'].publish(joints())
-    stranger.wait_until(lambda: stranger.received['joint_trajectory'])
-    stranger.wait_until(lambda: not queue._open)
+def test_a_request_without_a_motion_leaves_the_plan_after_a_stop_to_be_made(alone):
+    one = alone()
+    stop_for(one)
+    rejected = one.answer(PointingGoal(np.zeros(3)))
+    assert rejected.trajectory is None
+    assert not one.publishers.motions
+    assert one.queue.pursues(one.goal)
+    one.read(joints())
+    one.run_until(lambda: one.publishers.motions)
+    one.run_until(lambda: not one.queue.pursues(one.goal))
 
 
-def test_where_it_cannot_replan_after_a_stop_it_holds_and_reports_why(start):
-    planner, stranger = start(max_samples=100)
-    say_all(planner, stranger, body_boxes=fenced())
-    stop_for(planner)
-    stranger.publishers['joint_states'].publish(joints())
-    stranger.wait_until(lambda: stranger.value('monitor') == 'holding')
-    said = stranger.value('last stop')
+def test_where_it_cannot_replan_after_a_stop_it_holds_and_reports_why(alone):
+    one = alone(max_samples=100)
+    one.see(fenced())
+    stop_for(one)
+    one.read(joints())
+    one.run_until(lambda: one.reporter.monitor_state[0] == 'holding')
+    said = one.reporter.monitor_state[1]
     assert said.startswith('arm holds its position: PLANNING_FAILED (-1): ')
-    assert not stranger.received['joint_trajectory']
+    assert not one.publishers.motions

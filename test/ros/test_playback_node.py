@@ -399,16 +399,11 @@ def test_a_signal_ends_the_process_with_code_0_and_no_traceback(observer, number
         'tiem_scale:=0.5',
     ],
 )
-def test_a_bad_parameter_ends_the_command_with_one_line_that_names_it(monkeypatch, capfd, setting):
-    def spin(_):
-        raise AssertionError(f'the node runs with {setting}')
-
-    monkeypatch.setattr(rclpy, 'spin', spin)
-    # Both belong to the tests before, too: the command has its own.
-    monkeypatch.setattr(rclpy.utilities, 'g_default_context', None)
+def test_a_bad_parameter_ends_the_command_with_one_line_that_names_it(call, monkeypatch, setting):
     monkeypatch.setenv('NUMBA_DISABLE_JIT', '0')
-    assert main(['--ros-args', '-p', setting]) == 1
-    (line,) = capfd.readouterr().err.splitlines()
+    ended = call(main, '--ros-args', '-p', setting)
+    assert ended.returncode == 1
+    (line,) = ended.stderr.splitlines()
     assert setting.split(':')[0] in line
 
 

@@ -9,6 +9,7 @@ Most runs are calls of its `main`, as a process takes seconds to load what this 
 from dataclasses import replace
 from functools import partial
 import gc
+from itertools import count
 import json
 import os
 import signal
@@ -26,6 +27,7 @@ pytest.importorskip('tqdm')
 
 from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
+from rclpy.serialization import serialize_message  # noqa: E402
 from rrth_planner.cli import point_at  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.io.resources import resource_path  # noqa: E402
@@ -47,7 +49,6 @@ from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.body_writer import body_from_file, body_to_msg  # noqa: E402
 from rrth_planner.ros.messages.trajectory import joint_trajectory_to_msg
 from rrth_planner.ros.middleware.child_process import ChildProcess  # noqa: E402
-from rrth_planner.ros.middleware.open_subscription import Arrival  # noqa: E402
 from samples import FOLDED, joints  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from trajectory_msgs.msg import JointTrajectory  # noqa: E402
@@ -56,7 +57,7 @@ from visualization_msgs.msg import MarkerArray  # noqa: E402
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 # Cold, the planner is compiled first [s].
 LONGEST_RUN = 280.0
-START, ARRIVAL = 250.0, Arrival((1, 1), 1)
+START = 250.0
 BOXES = resource_path('config/body.yaml')
 MARKERS = resource_path('msg_examples/body.yaml')
 COMMAND = [sys.executable, '-m', 'rrth_planner.cli.point_at']
@@ -93,6 +94,17 @@ def impatient(patch, owner, name, timeout):
         return function(client, *arguments)
 
     patch.setattr(owner, name, hurried)
+
+
+def read(client, msg):
+    """Have a client take a joint state, as its executor would."""
+    topic = client.resolve_topic_name('joint_states')
+    take = next(s.callback for s in client.subscriptions if s.topic_name == topic)
+    n = next(SENT)
+    take(serialize_message(msg), {'source_timestamp': n, 'publication_sequence_number': n})
+
+
+SENT = count(1)
 
 
 class Bystander(Node):
@@ -242,7 +254,7 @@ def test_an_arm_that_stays_off_the_end_of_its_motion_is_not_waited_for_for_ever(
     client.joint_names = arm.joint_names
     motion, message = turn(np.array(FOLDED) + 0.1, 0.1)
     client.commanded = [message]
-    client._on_state(joints(FOLDED), ARRIVAL)
+    read(client, joints(FOLDED))
     with pytest.raises(NotInTimeError, match='is 0.1000 from the end of its motion of 0.10 s'):
         follow(client, arm, motion, None, 1e-3, Answer(ErrorCode.SUCCESS, ''))
 
@@ -346,14 +358,14 @@ def test_a_destroyed_client_leaves_nothing_to_destroy_again(ros_context, monkeyp
     assert not ignored
 
 
-def test_an_interrupt_in_mid_step_leaves_no_other_words(client, monkeypatch):
-    def interrupted(**_):
+def test_an_interrupt_in_mid_step_leaves_no_other_words(client):
+    def interrupt():
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(client._spinner, 'spin_once', interrupted)
+    client.create_timer(0.001, interrupt)
     with warnings.catch_warnings():
         with pytest.raises(KeyboardInterrupt):
-            client.take_messages()
+            client.take_messages(10.0)
         assert warnings.filters[0][:3:2] == ('ignore', RuntimeWarning)
 
 
@@ -392,8 +404,8 @@ def test_a_motion_of_another_machine_is_ignored(client):
         time.sleep(0.02)
         client.commanded += next(came, [])
         ours = [msg for msg in client.commanded if msg.points][-1]
-        client._on_state(joints(ours.points[-1].positions), ARRIVAL)
-        client._on_state(joints(FOLDED[:2]), ARRIVAL)
+        read(client, joints(ours.points[-1].positions))
+        read(client, joints(FOLDED[:2]))
 
     client.take_messages = take_messages
     follow(client, arm, first, None, 1e-3, Answer(ErrorCode.SUCCESS, ''))
@@ -402,9 +414,9 @@ def test_a_motion_of_another_machine_is_ignored(client):
 
 def test_joint_positions_that_are_none_do_not_count(client):
     client.joint_names = load_arm().joint_names
-    client._on_state(joints(FOLDED), ARRIVAL)
+    read(client, joints(FOLDED))
     for bad in (joints(FOLDED[:2]), joints([float('nan')] * 4), JointState(name=['wheel'])):
-        client._on_state(bad, ARRIVAL)
+        read(client, bad)
     assert client.positions().tolist() == FOLDED
     assert len(client.observed) == 1
 

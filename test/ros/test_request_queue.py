@@ -19,7 +19,6 @@ from rrth_planner.execution.joint_reading import JointReading  # noqa: E402
 from rrth_planner.model.errors import RecordError, RequestError  # noqa: E402
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.status import ErrorCode  # noqa: E402
-from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
 from rrth_planner.requests.request_queue import MOST_WAITING, PlanQueue  # noqa: E402
 from rrth_planner.ros.interface.inputs import Inputs  # noqa: E402
 from rrth_planner.ros.interface.parameters import NEVER  # noqa: E402
@@ -29,6 +28,7 @@ from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
 from rrth_planner.ros.messages.marker_edits import BodyPart  # noqa: E402
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor  # noqa: E402
 from rrth_planner.ros.requests.node_host import NodeHost  # noqa: E402
+from stranger import Scripted  # noqa: E402
 import worlds  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
@@ -48,9 +48,10 @@ def _queue():
     inputs.body.measured = inputs.joints.measured = now
     publishers, reporter = PlanPublishers(node, NEVER, 'torso'), Reporter(node, inputs, parameters)
     monitor = ExecutionMonitor(node, inputs, reporter, publishers)
-    host = NodeHost(node, InProcessPlanner())
+    script = Scripted()
+    host = NodeHost(node, script)
     queue = PlanQueue(host, inputs, reporter, publishers, monitor)
-    queue.host, queue.reporter, queue.monitor = host, reporter, monitor
+    queue.host, queue.reporter, queue.monitor, queue.script = host, reporter, monitor, script
     yield queue
     queue.close()
     node.destroy_node()
@@ -115,7 +116,7 @@ def test_a_planner_that_hangs_is_answered_for(queue, monkeypatch):
 
     options = replace(queue.reporter.parameters.options, time_limit=0.1)
     queue.reporter.parameters = replace(queue.reporter.parameters, options=options)
-    monkeypatch.setattr(InProcessPlanner, 'plan', hang)
+    queue.script.plans = hang
     outcomes = outcomes_of(queue, [ask(queue, GOAL) for _ in range(2)])
     end.set()
     for outcome in outcomes:
@@ -140,7 +141,7 @@ def test_a_request_whose_motion_could_not_begin_can_still_be_cancelled(queue, mo
 
 def test_a_flight_record_that_cannot_be_made_costs_no_answer(queue, monkeypatch):
     monkeypatch.setattr(FlightRecorder, 'to_bytes', lambda _: 1 / 0)
-    monkeypatch.setattr(InProcessPlanner, 'plan', lambda *_: 1 / 0)
+    queue.script.plans = lambda *_: 1 / 0
     (outcome,) = outcomes_of(queue, [ask(queue, GOAL)])
     assert outcome.code is ErrorCode.FAILURE
     assert 'ZeroDivisionError' in outcome.sentence

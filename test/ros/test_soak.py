@@ -8,7 +8,8 @@ from multiprocessing import Pipe
 import os
 import re
 import signal
-import threading
+import subprocess
+import sys
 import time
 
 from hypothesis import given, strategies as st
@@ -20,7 +21,6 @@ pytest.importorskip('tqdm')
 pytest.importorskip('psutil')
 pytest.importorskip('matplotlib')
 
-from benchmarks.common import processors
 from benchmarks.common.processors import lose_time_asleep, OnEachProcessor, stay_awake  # noqa: E402
 from benchmarks.common.real_time import (  # noqa: E402
     give_way,
@@ -404,13 +404,13 @@ def test_processors_are_kept_awake_by_what_gives_way_to_all_others():
     ],
 )
 def test_processors_are_kept_awake_where_their_host_takes_them_away(
-    monkeypatch, tmp_path, cpuinfo, quota, is_so
+    tmp_path, cpuinfo, quota, is_so
 ):
-    for name, text in (('CPUINFO', cpuinfo), ('CPU_MAX', quota)):
-        monkeypatch.setattr(processors, name, tmp_path / name)
+    files = {tmp_path / 'cpuinfo': cpuinfo, tmp_path / 'cpu.max': quota}
+    for file, text in files.items():
         if text is not None:
-            (tmp_path / name).write_text(text)
-    assert lose_time_asleep() is is_so
+            file.write_text(text)
+    assert lose_time_asleep(*files) is is_so
 
 
 def test_where_idle_priority_is_rejected_nothing_is_kept_awake(monkeypatch):
@@ -492,18 +492,30 @@ def test_the_client_gives_way_to_what_it_measures_in_real_time(monkeypatch, kind
     assert ('in real time' in scheduling()) != is_ordinary
 
 
-def test_a_node_may_have_a_processor_for_itself(monkeypatch):
-    placed = {}
-    monkeypatch.setattr(os, 'sched_getaffinity', lambda _: {4, 2, 3})
-    monkeypatch.setattr(os, 'sched_setaffinity', lambda k, cores: placed.update({k: list(cores)}))
-    own = threading.get_native_id()
-    with staying_off([7, 8], [9]):
-        assert placed == placed | {7: [4], 8: [4], 9: [2, 3], own: [2, 3]}
-    assert placed == placed | {7: [4], 8: [4], own: [2, 3, 4]}
-    # Of a single one nobody stays off.
-    monkeypatch.setattr(os, 'sched_getaffinity', lambda _: {2})
-    with staying_off([7]):
-        assert placed[7] == placed[own] == [2]
+def test_a_node_may_have_a_processor_for_itself():
+    known = sorted(os.sched_getaffinity(0))
+    if len(known) < 2:
+        pytest.skip('a single processor')
+    *others, last = known
+    sleep = [sys.executable, '-c', 'input()']
+    with (
+        subprocess.Popen(sleep, stdin=subprocess.PIPE) as node,
+        subprocess.Popen(sleep, stdin=subprocess.PIPE) as aside,
+    ):
+        try:
+            with staying_off([node.pid], [aside.pid]):
+                assert os.sched_getaffinity(node.pid) == {last}
+                for pid in (0, aside.pid):
+                    assert os.sched_getaffinity(pid) == set(others)
+            assert os.sched_getaffinity(0) == set(known)
+            # Of a single one nobody stays off.
+            os.sched_setaffinity(0, {last})
+            with staying_off([node.pid]):
+                assert os.sched_getaffinity(node.pid) == os.sched_getaffinity(0) == {last}
+        finally:
+            os.sched_setaffinity(0, known)
+            for process in (node, aside):
+                process.kill()
 
 
 @pytest.mark.parametrize(

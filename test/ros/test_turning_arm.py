@@ -4,18 +4,18 @@
 
 import json
 import re
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 
 pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
+pytest.importorskip('tqdm')
 
 from geometry_msgs.msg import PointStamped  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
+from rrth_planner.cli import point_at  # noqa: E402
 from rrth_planner.io.arm_file import arm_to_yaml  # noqa: E402
 from rrth_planner.model.arm import ArmModel, pointing_error  # noqa: E402
 from rrth_planner.ros.middleware.child_process import ChildProcess  # noqa: E402
@@ -123,7 +123,7 @@ def test_every_motion_begins_at_the_reading_and_ends_on_the_target(
         wait_until(driver.plan.service_is_ready, 240.0)
         send(driver, driver.body, samples.array(samples.box('far', center=[0.0, 0.0, -5.0])))
         # A driver that counts: it is started again, at another turn each time.
-        for pan, way in ((3.1, 0.5), (-3.1, -0.5), (9.0, 2.0), (-17.0, 1.0)):
+        for pan, way in ((3.1, 0.5), (9.0, 2.0), (-17.0, 1.0)):
             with playback(pan):
                 wait_until(is_listening)
                 begin, first, end = go(way)
@@ -133,7 +133,7 @@ def test_every_motion_begins_at_the_reading_and_ends_on_the_target(
         driver.wraps = True
         with playback(3.0):
             wait_until(is_listening)
-            for way in (2.0, 2.0, 2.0, 2.0, -2.5, -2.5, -2.5, -2.5, -2.5):
+            for way in (2.0, 2.0, 2.5, -2.5, -2.5, -2.5, -2.5):
                 begin, first, end = go(way)
                 assert np.abs(first - begin).max() < 1e-9
                 assert end[0] == pytest.approx(begin[0] + way, abs=1e-6)
@@ -142,8 +142,7 @@ def test_every_motion_begins_at_the_reading_and_ends_on_the_target(
     assert all(abs(float(one) - float(other)) < np.pi for one, other in found), said
 
 
-def test_point_at_follows_an_arm_whose_driver_wraps(tmp_path, wait_until, send, spinning):
-    pytest.importorskip('tqdm')
+def test_point_at_follows_an_arm_whose_driver_wraps(tmp_path, wait_until, send, spinning, call):
     file = tmp_path / 'arm.yaml'
     file.write_text(arm_to_yaml(ARM, 'arm'))
     driver, said = Driver(), []
@@ -151,13 +150,10 @@ def test_point_at_follows_an_arm_whose_driver_wraps(tmp_path, wait_until, send, 
     ros = ['--ros-args', '-p', f'arm:={file}', '-p']
     playback = [*ros, 'initial_positions:=[3.0, 0.0]', '-r', 'joint_states:=true_states']
 
-    def point_at(angle, *options):
+    def pointed_at(angle, *options):
         """Return what the command reports of a target in a direction [rad]."""
         target = [f'{x:.9f}' for x in (2.0 * np.cos(angle), 2.0 * np.sin(angle), 0.3)]
-        command = [sys.executable, '-m', 'rrth_planner.cli.point_at', '--json', *options]
-        ended = subprocess.run(
-            [*command, '--', *target], capture_output=True, text=True, timeout=280.0
-        )
+        ended = call(point_at.main, '--json', *options, '--', *target)
         report = json.loads(ended.stdout)
         assert ended.returncode == 0, (report, ended.stderr, said)
         assert report['pointing_error'] < 1e-3
@@ -177,10 +173,10 @@ def test_point_at_follows_an_arm_whose_driver_wraps(tmp_path, wait_until, send, 
         send(driver, driver.body, samples.array(samples.box('far', center=[0.0, 0.0, -5.0])))
         # Across half a turn, on through the next one, and back.
         for pan in (4.0, 6.5, 9.0, 7.0):
-            assert point_at(pan)['arrived'] is True
+            assert pointed_at(pan)['arrived'] is True
             assert driver.states[-1].position[0] == pytest.approx(pan, abs=1e-3)
             assert abs(driver.states[-1].position[1]) < 1.0
         # Where it is reported it would not move a joint by a turn either.
-        assert point_at(8.0, '--no-move')['figures']['duration'] < 3.0
+        assert pointed_at(8.0, '--no-move')['figures']['duration'] < 3.0
         assert driver.states[-1].position[0] == pytest.approx(7.0, abs=1e-3)
     driver.destroy_node()

@@ -24,10 +24,12 @@ from geometry_msgs.msg import (  # noqa: E402
 )
 from monitored import know  # noqa: E402
 from nav_msgs.srv import GetPlan  # noqa: E402
+import rclpy  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
+from rosgraph_msgs.msg import Clock  # noqa: E402
 from rrth_planner.execution.tracked_motion import forget_command  # noqa: E402
 from rrth_planner.model.errors import LONGEST_SENTENCE  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
@@ -37,6 +39,7 @@ from samples import array, box, FOLDED, JOINTS, joints, target, wearer  # noqa: 
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_msgs.msg import Header  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
+from stranger import inputs_of  # noqa: E402
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
 from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
 
@@ -115,6 +118,11 @@ SPOILS = st.lists(
     ),
     max_size=3,
 )
+WIRES = {
+    'body': ('/fire/body_boxes', MarkerArray),
+    'target': ('/fire/target', PointStamped),
+    'joints': ('/fire/joint_states', JointState),
+}
 MANY = settings(max_examples=300, deadline=None)
 
 
@@ -139,7 +147,7 @@ class Complaints:
     """A logger that keeps what only a fault of the node itself writes."""
 
     def __init__(self):
-        self.errors = []
+        self.errors, self.infos = [], []
 
     def error(self, line):
         if 'Traceback' in line:
@@ -149,7 +157,37 @@ class Complaints:
         if not line.isprintable() or len(line) > LONGEST_SENTENCE + 200:
             self.errors.append(line)
 
-    info = warning
+    def info(self, line, **_):
+        self.infos.append(line)
+        self.warning(line)
+
+
+def callbacks(entities, name):
+    """Return what the executor calls for a topic or a service of a node, one for each reader."""
+    return [e.callback for e in entities if name in (getattr(e, 'topic_name', ''), _service(e))]
+
+
+def _service(entity):
+    return getattr(entity, 'service_name', '')
+
+
+class Listener:
+    """Keeps what a node publishes on a topic."""
+
+    def __init__(self, msg_type, topic):
+        self.node, self.received = Node('listener'), []
+        profile = QoSProfile(depth=100, durability=DurabilityPolicy.VOLATILE)
+        self.node.create_subscription(msg_type, topic, self.received.append, profile)
+
+    def count(self, at_least=0):
+        """Return how many messages have come in all, once there are so many."""
+        end = time.monotonic() + 30.0
+        n = -1
+        while n != len(self.received) or n < at_least:
+            assert time.monotonic() < end, f'{n} messages, expected {at_least}'
+            n = len(self.received)
+            rclpy.spin_once(self.node, timeout_sec=0.1 if n < at_least else 0.0)
+        return n
 
 
 class Wire:
@@ -157,17 +195,28 @@ class Wire:
 
     def __init__(self, planner):
         self.planner, self.sent = planner, count(1)
-        self.inputs = planner._scene_monitor._inputs
-        self.subscriptions = dict(
-            zip(('body', 'target', 'joints'), planner._scene_monitor._subscriptions, strict=True)
-        )
-        self.published, self.complaints = [], Complaints()
+        self.inputs = inputs_of(planner)
+        self.complaints = Complaints()
         planner.get_logger = lambda: self.complaints
-        publishers = planner._queue._publishers
-        publishers.publish_motion = lambda *motion: self.published.append(
-            publishers.motion(*motion)
-        )
-        publishers.publish_view = lambda *a: None
+        self.listener = Listener(JointTrajectory, '/fire/joint_trajectory')
+        # Of these it reads by another reader, too.
+        stranger, topics = self.listener.node, {}
+        for name, (topic, kind) in WIRES.items():
+            stranger.create_publisher(kind, topic, 10)
+            topics[name] = topic
+        end = time.monotonic() + 30.0
+        while any(len(self.readers(topic)) < 2 for topic in topics.values()):
+            assert time.monotonic() < end
+            rclpy.spin_once(planner, timeout_sec=0.1)
+        self.callbacks = {name: self.readers(topic) for name, topic in topics.items()}
+        self.services = {
+            name: callbacks(planner.services, f'/fire/rrth_planner/{name}')[0]
+            for name in ('plan', 'get_plan')
+        }
+
+    def readers(self, topic):
+        """Return what takes messages of a topic: of a best-effort reader, of a reliable one."""
+        return callbacks(self.planner.subscriptions, topic)
 
     def say(self, name, msg, is_reliable=False):
         """Return whether a message was taken."""
@@ -175,9 +224,8 @@ class Wire:
         before = (source.n_rejected, source.value, source.measured)
         data = msg if isinstance(msg, bytes) else serialize_message(msg)
         n = next(self.sent)
-        subscription = self.subscriptions[name]
         info = {'source_timestamp': n, 'publication_sequence_number': n}
-        subscription._on_copy(data, info, 'reliable' if is_reliable else None)
+        self.callbacks[name][is_reliable](data, info)
         assert not self.complaints.errors
         if source.n_rejected > before[0]:
             assert source.n_rejected == before[0] + 1
@@ -186,24 +234,36 @@ class Wire:
             return False
         return True
 
+    def answer(self, name, request, response):
+        """Return the answer of a service."""
+        answer = finish(self.services[name](request, response), self.planner)
+        assert not self.complaints.errors
+        return answer
+
     def plan(self):
         """Return the answer to a request, after checking what was published."""
-        before = len(self.published)
-        answer = finish(self.planner._on_plan(Trigger.Request(), Trigger.Response()), self.planner)
+        for timer in self.planner.timers:
+            timer.callback()
+        before = self.listener.count()
+        answer = self.answer('plan', Trigger.Request(), Trigger.Response())
         assert is_a_sentence(answer.message)
         assert 'FAILURE (99999)' not in answer.message
-        assert not self.complaints.errors
-        assert len(self.published) == before + answer.success
+        assert self.listener.count(before + answer.success) == before + answer.success
         return answer
 
     def is_well(self):
         """Return whether good messages are taken, and planned with."""
         # The arm has executed nothing: what it was commanded before does not count.
         monitor = self.planner._monitor
-        with monitor._lock:
-            know(monitor, tracked=forget_command(monitor.watch.tracked))
+        know(monitor, tracked=forget_command(monitor.watch.tracked))
         good = {'body': wearer(), 'target': target(), 'joints': joints()}
-        return all(self.say(name, msg) for name, msg in good.items()) and self.plan().success
+        if not all(self.say(name, msg) for name, msg in good.items()):
+            return False
+        answer = self.plan()
+        while answer.message.startswith('TIMED_OUT'):
+            # A busy machine.
+            answer = self.plan()
+        return answer.success
 
 
 @pytest.fixture(name='wire', scope='module')
@@ -217,19 +277,78 @@ def _wire(ros_context):
             Parameter('separation', value=False),
         ],
     )
-    yield Wire(planner)
+    wire = Wire(planner)
+    yield wire
     planner.close()
-    planner.destroy_node()
+    for node in (planner, wire.listener.node):
+        node.destroy_node()
+
+
+class Arm:
+    """A playback in simulated time, which is given motions as the middleware would."""
+
+    def __init__(self):
+        self.complaints = Complaints()
+        self.node = PlaybackNode(
+            namespace='/fire', parameter_overrides=[Parameter('use_sim_time', value=True)]
+        )
+        self.node.get_logger = lambda: self.complaints
+        # Only one of its two readers passes on what it is given; the other one supervises.
+        self.readers = callbacks(self.node.subscriptions, '/fire/joint_trajectory')
+        (self.stop,) = callbacks(self.node.services, '/fire/arm_playback/stop')
+        (self.tell,) = callbacks(self.node.subscriptions, '/clock')
+        (timer,) = self.node.timers
+        self.publish = timer.callback
+        self.listener, self.n_published, self.now = (
+            Listener(JointState, '/fire/joint_states'),
+            0,
+            0,
+        )
+        self.wait(1000)
+
+    def take(self, data):
+        """Return whether a motion is executed, by its bytes."""
+        for read in self.readers:
+            read(data)
+        assert not self.complaints.errors
+        lines, self.complaints.infos = self.complaints.infos, []
+        return any(line.startswith('executing a motion') for line in lines)
+
+    def wait(self, seconds):
+        """Let a time pass; return where the arm is, and how fast."""
+        self.now += seconds
+        self.tell(Clock(clock=Time(sec=self.now)))
+        self.publish()
+        self.n_published += 1
+        assert self.listener.count(self.n_published) == self.n_published
+        state = self.listener.received[-1]
+        return np.array(state.position), np.array(state.velocity)
+
+    def go_home(self):
+        """Return whether it can be stopped, and moved to where good motions begin."""
+        assert self.stop(Trigger.Request(), Trigger.Response()).success
+        q, v = self.wait(100)
+        assert not v.any()
+        rest = {'velocities': [0.0] * 4, 'accelerations': [0.0] * 4}
+        points = [
+            JointTrajectoryPoint(positions=row, time_from_start=Duration(sec=since), **rest)
+            for row, since in ((q.tolist(), 0), (FOLDED, 100))
+        ]
+        msg = JointTrajectory(joint_names=JOINTS, points=points)
+        return self.take(serialize_message(msg)) and self.is_home(200)
+
+    def is_home(self, seconds=0):
+        """Return whether it rests, after a time [s], where good motions begin."""
+        q, v = self.wait(seconds)
+        return not v.any() and np.abs(q - FOLDED).max() < 1e-9
 
 
 @pytest.fixture(name='playback', scope='module')
 def _playback(ros_context):
-    node = PlaybackNode(namespace='/fire')
-    complaints = Complaints()
-    node.get_logger = lambda: complaints
-    yield node
-    assert not complaints.errors
-    node.destroy_node()
+    arm = Arm()
+    yield arm
+    for node in (arm.node, arm.listener.node):
+        node.destroy_node()
 
 
 @MANY
@@ -306,12 +425,16 @@ def test_get_plan_answers_whatever_is_asked(wire, start, goal, is_empty):
     wire.say('body', wearer())
     wire.say('joints', joints())
     request = GetPlan.Request(start=PoseStamped() if is_empty else start, goal=goal)
-    before = len(wire.published)
-    planner = wire.planner
-    answer = finish(planner._on_get_plan(request, GetPlan.Response()), planner)
-    assert bool(answer.plan.poses) == len(wire.published) - before
-    last = planner._reporter.last
+    before = wire.listener.count()
+    answer = wire.answer('get_plan', request, GetPlan.Response())
+    expected = before + bool(answer.plan.poses)
+    assert wire.listener.count(expected) == expected
+    last = reporter_of(wire).last
     assert last is None or is_a_sentence(last.text)
+
+
+def reporter_of(wire):
+    return wire.planner._reporter
 
 
 @settings(max_examples=100, deadline=None)
@@ -321,7 +444,8 @@ def test_get_plan_answers_whatever_is_asked(wire, start, goal, is_empty):
 )
 def test_any_parameter_is_taken_or_rejected_in_a_sentence(wire, name, value):
     planner = wire.planner
-    before = planner._reporter.parameters
+    reporter = reporter_of(wire)
+    before = reporter.parameters
     known = [p for p in ('algorithm', 'margin', 'seed', 'max_velocity', 'time_limit') if p == name]
     old = [planner.get_parameter(p) for p in known]
     try:
@@ -331,7 +455,7 @@ def test_any_parameter_is_taken_or_rejected_in_a_sentence(wire, name, value):
         return
     if not result.successful:
         assert is_a_sentence(result.reason)
-        assert planner._reporter.parameters is before
+        assert reporter.parameters is before
     assert all(r.successful for r in planner.set_parameters(old))
 
 
@@ -371,39 +495,33 @@ def spoiled(spoils):
 @MANY
 @given(spoils=SPOILS, should_stop=st.booleans())
 def test_any_trajectory_is_executed_or_rejected(playback, spoils, should_stop):
-    before = playback._playback
-    playback._on_raw_trajectory(serialize_message(spoiled(spoils)))
+    is_taken = playback.take(serialize_message(spoiled(spoils)))
     if should_stop:
-        answer = playback._on_stop(Trigger.Request(), Trigger.Response())
+        answer = playback.stop(Trigger.Request(), Trigger.Response())
         assert answer.success
         assert is_a_sentence(answer.message)
-    playback._publish()
-    assert np.isfinite(playback._state.position).all()
-    assert np.isfinite(playback._state.velocity).all()
-    if playback._playback is not before:
-        # Back to where good motions begin.
-        playback._follow(before)
+    states = playback.wait(0), playback.wait(1)
+    assert np.isfinite(states).all()
+    # By then it has stopped.
+    assert not (should_stop and states[-1][1].any())
+    assert playback.go_home() if is_taken else playback.is_home()
 
 
 @MANY
 @given(data=st.binary(max_size=80))
 def test_bytes_that_are_no_trajectory_are_rejected(playback, data):
-    before = playback._playback
-    playback._on_raw_trajectory(b'\0\1\0\0' + data)
-    playback._on_raw_trajectory(data)
-    assert playback._playback is before
+    assert not playback.take(b'\0\1\0\0' + data)
+    assert not playback.take(data)
 
 
 def test_a_motion_of_too_many_bytes_is_rejected(playback):
-    before = playback._playback
-    playback._on_raw_trajectory(serialize_message(good_motion()) + bytes(MOST_BYTES))
-    assert playback._playback is before
+    assert not playback.take(serialize_message(good_motion()) + bytes(MOST_BYTES))
+    assert playback.is_home(1)
 
 
 def test_after_all_of_this_a_good_motion_is_followed(playback):
-    before = playback._playback
-    playback._on_raw_trajectory(serialize_message(good_motion()))
-    assert playback._playback is not before
+    assert playback.take(serialize_message(good_motion()))
+    assert not playback.is_home(1)
 
 
 def test_whatever_comes_over_the_wire_the_nodes_live_on(spinning, send, wait_until):
@@ -412,7 +530,9 @@ def test_whatever_comes_over_the_wire_the_nodes_live_on(spinning, send, wait_unt
         namespace='/wire',
         parameter_overrides=[Parameter('separation', value=False)],
     )
-    playback = PlaybackNode(namespace='/wire')
+    # The planner's own motions would move the arm, whose joints the fire is about.
+    elsewhere = ['--ros-args', '-r', 'joint_states:=elsewhere']
+    playback = PlaybackNode(namespace='/wire', cli_args=elsewhere)
     stranger, motions = Node('stranger', namespace='/wire'), []
     topics = {
         'body_boxes': (ARRAYS, wearer()),
@@ -442,16 +562,13 @@ def test_whatever_comes_over_the_wire_the_nodes_live_on(spinning, send, wait_unt
             publisher.publish(b'\0\1\0\0' + data.draw(st.binary(max_size=40)))
         ask()
 
-    # The planner's own motions would move the arm, whose joints the fire is about.
-    playback.destroy_publisher(playback._joint_states)
-    playback._joint_states = playback.create_publisher(JointState, 'elsewhere', 10)
     with spinning(planner), spinning(playback), spinning(stranger):
         wait_until(plan.service_is_ready)
         fire()
         for publisher, _, good in publishers.values():
             if good is not None:
                 send(stranger, publisher, good)
-        n, inputs = len(motions), planner._scene_monitor._inputs
+        n, inputs = len(motions), inputs_of(planner)
         wait_until(lambda: not any(source.is_last_rejected for source in inputs.all.values()))
         wait_until(lambda: ask().success)
         wait_until(lambda: len(motions) > n)

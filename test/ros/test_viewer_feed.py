@@ -53,18 +53,18 @@ def test_the_feed_shows_what_the_nodes_say_and_asks_for_the_newest_target():
                 wait_until(lambda: feed.said.startswith('SUCCESS'))
                 wait_until(lambda: np.allclose(feed.target, TARGETS[-1]))
 
-                def is_answered():
+                def has_arrived():
                     # A busy machine may not plan in time for an arm that moves.
-                    if not feed._is_asking and feed.said.startswith('TIMED_OUT'):
+                    if feed.said.startswith('TIMED_OUT'):
                         feed.ask()
-                    return not feed._is_asking
+                    # The motion that is shown is the one that the arm follows to its end.
+                    is_there = np.allclose(
+                        feed.trajectory.positions[-1], feed.positions, atol=1e-6
+                    )
+                    return is_there and pointing_error(arm, feed.positions, TARGETS[-1]) < 1e-3
 
-                wait_until(is_answered)
-                # The motion that is shown is the one that the arm follows to its end.
-                wait_until(
-                    lambda: np.allclose(feed.trajectory.positions[-1], feed.positions, atol=1e-6)
-                )
-                assert pointing_error(load_arm(), feed.positions, TARGETS[-1]) < 1e-3
+                arm = load_arm()
+                wait_until(has_arrived)
                 feed.ask(np.zeros(3))
                 wait_until(lambda: feed.said.startswith('GOAL_IN_COLLISION'))
                 assert 'inside box' in feed.said
@@ -108,47 +108,74 @@ def test_a_planner_that_ends_while_it_is_asked_leaves_the_next_one_to_be_asked()
         with spinning(first):
             feed.ask()
             wait_until(lambda: first.n_asked)
-            assert feed._is_asking
         first.destroy_node()
-        wait_until(lambda: not feed._is_asking)
-        assert 'ended without an answer' in feed.said
+        wait_until(lambda: 'ended without an answer' in feed.said)
         assert f'waiting for {feed.resolve_topic_name("body_boxes")}' in feed.said
         second = Planner(does_answer=True)
         with spinning(second):
             feed.ask()
             wait_until(lambda: feed.said.startswith('SUCCESS'))
-            wait_until(lambda: not feed._is_asking)
         second.destroy_node()
 
 
+class FailingClient:
+    """A client of a service: the first request fails, the others are never answered."""
+
+    srv_name = '/rrth_planner/plan'
+
+    def __init__(self):
+        self.n_asked = 0
+
+    def service_is_ready(self):
+        """As of `Client`."""
+        return True
+
+    def call_async(self, _):
+        """As of `Client`."""
+        self.n_asked, future = self.n_asked + 1, Future()
+        if self.n_asked == 1:
+            future.set_exception(RuntimeError('no way\nout'))
+        return future
+
+
+class FailingFeed(ViewerFeed):
+    """A feed with that client."""
+
+    def create_client(self, *_, **__):
+        """As of `Node`."""
+        self.client = FailingClient()
+        return self.client
+
+
 def test_a_failed_request_is_reported_and_the_next_one_is_made(ros_context):
-    feed = ViewerFeed()
-    feed._is_asking = True
-    future = Future()
-    future.set_exception(RuntimeError('no way\nout'))
-    feed._on_answer(future)
-    assert not feed._is_asking
-    assert feed.said.startswith('no answer of the planner: no way out')
+    feed = FailingFeed()
+    with spinning(feed):
+        feed.ask()
+        wait_until(lambda: feed.said.startswith('no answer of the planner: no way out'))
+        assert feed.client.n_asked == 1
+        feed.ask()
+        wait_until(lambda: feed.client.n_asked == 2)
     feed.destroy_node()
 
 
 def test_the_feed_knows_how_a_motion_is_executed_and_rejects_what_is_no_state(ros_context):
     feed = ViewerFeed()
+    (take,) = (s.callback for s in feed.subscriptions if s.topic_name == '/rrth_planner/state')
     assert feed.separation is None
     slowed = SeparationStatus(
         SeparationState.SLOWED, 'bar is too near to head', 0.25, 'bar', 'head'
     )
     for status in (SeparationStatus(), slowed):
-        feed._on_state(separation_to_msg('planner', status))
+        take(separation_to_msg('planner', status))
         assert feed.separation == status
     assert feed.said.startswith(
         'SLOWED: bar is too near to head, at 25% of its speed; waiting for'
     )
     for name, rate in (('SLOW', '0.5'), ('NORMAL', 'fast'), ('NORMAL', 'nan'), ('NORMAL', None)):
         values = [] if rate is None else [KeyValue(key=RATE_KEY, value=rate)]
-        feed._on_state(DiagnosticStatus(message=name, values=values))
+        take(DiagnosticStatus(message=name, values=values))
         assert feed.separation == slowed
-    feed._on_state(separation_to_msg('planner', SeparationStatus(rate=1.004)))
+    take(separation_to_msg('planner', SeparationStatus(rate=1.004)))
     assert feed.separation == SeparationStatus()
     feed.destroy_node()
 
@@ -175,12 +202,12 @@ class SlowFeed(ViewerFeed):
 def test_no_target_is_lost_between_two_threads(ros_context):
     planner, feed = Planner(does_answer=True), SlowFeed(namespace='left')
     with spinning(planner):
-        wait_until(feed._client.service_is_ready)
         feed.ask(TARGETS[0])
         feed.asker = asker = Thread(target=feed.ask, args=(TARGETS[1],))
-        feed._on_timer()
-        asker.join()
-        assert feed._is_asking
-        np.testing.assert_array_equal(feed._newest, TARGETS[1])
+        with spinning(feed):
+            wait_until(lambda: planner.n_asked == 2)
+            assert feed.asker is None
+            asker.join()
+            wait_until(lambda: np.allclose(feed.target, TARGETS[1]))
     feed.destroy_node()
     planner.destroy_node()
