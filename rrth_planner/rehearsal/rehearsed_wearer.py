@@ -80,7 +80,8 @@ class RecordedWearer:
 
     def _found(self, first: int, end: int) -> Array:
         """Return the boxes of all parts at some instants, (end - first, n_parts, 15)."""
-        times = self._first + np.arange(first, end) * INSTANT * self._rate
+        k = np.arange(first, end, dtype=np.float64)
+        times: Array = self._first + k * INSTANT * self._rate
         postures = postures_at(self._person, times)
         return rows_of_postures(self._skeleton, self._person.names, *postures)
 

@@ -150,11 +150,10 @@ class Witness:
         distances = distances_to(arm, q, v, names, rows, speed, WITHIN)
         classes = classes_of(distances)
         for i, bar, box in np.argwhere(classes != ''):
-            self._meet(
-                *(float(times[i]), seen[i // 2].sights, self._n_judged + int(i)),
-                *(int(bar), int(box)),
-                *(str(classes[i, bar, box]), float(distances.speeds[i, bar, box]), rows[i, box]),
-            )
+            word, speed_there = str(classes[i, bar, box]), float(distances.speeds[i, bar, box])
+            sights, at = seen[i // 2].sights, self._n_judged + int(i)
+            row: Array = rows[i, box]
+            self._meet(float(times[i]), sights, at, int(bar), int(box), word, speed_there, row)
         self._n_judged += len(times)
         for key, contact in tuple(self._open.items()):
             if contact.last < self._n_judged - 1:

@@ -59,4 +59,9 @@ def controller_points_from_msg(
     last = rows['velocities'][-1]
     if (np.abs(last) > REST_VELOCITY).any():
         raise MessageError(f'velocity of the last point: {last.tolist()}, expected 0 [rad/s]')
-    return TimedPoints(times=np.array(times) / NANOSECONDS, **rows)
+    return TimedPoints(
+        times=np.array(times) / NANOSECONDS,
+        positions=rows['positions'],
+        velocities=rows['velocities'],
+        accelerations=rows['accelerations'],
+    )
