@@ -3,6 +3,7 @@
 """Who may import whom: the table of CONTRIBUTING.md, late imports included."""
 
 import ast
+from functools import cache
 from graphlib import TopologicalSorter
 import os
 from pathlib import Path
@@ -107,8 +108,13 @@ def room_of(module):
     return (module.split('.') + [''])[1]
 
 
+@cache
 def imports_of(file):
     """Return what a file imports: (name, level, is at the top) of each import."""
+    return tuple(_imports_of(file))
+
+
+def _imports_of(file):
     tree = ast.parse(file.read_text(encoding='utf-8'))
     top = set(map(id, tree.body))
     for node in ast.walk(tree):
