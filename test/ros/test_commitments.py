@@ -356,16 +356,18 @@ def test_a_body_that_is_stale_ends_in_a_protective_stop(separated):
     assert arm.is_over
 
 
-def test_an_error_moves_the_arm_no_further_than_its_commitment_until_reset(separated):
+@pytest.mark.parametrize('broken', ['extended', 'body_at'])
+def test_an_error_moves_the_arm_no_further_than_its_commitment_until_reset(
+    separated, monkeypatch, broken
+):
     arm, hand = beside(separated, 0.2)
-    report = arm.reporter.commitment_published
 
     def fail(*_):
         raise ZeroDivisionError('of the test')
 
-    arm.reporter.commitment_published = fail
+    monkeypatch.setattr(commitments, broken, fail)
     arm.frames(80, hand)
-    arm.reporter.commitment_published = report
+    monkeypatch.undo()
     assert arm.is_over
     assert arm.statuses[-1].state is SeparationState.FAULT
     assert 'ZeroDivisionError: of the test' in arm.statuses[-1].cause
