@@ -12,7 +12,7 @@ quintic. After the last point that one holds.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 import functools
 
@@ -67,8 +67,11 @@ class TimedPoints:
         [rad or m].
     velocities, accelerations : ndarray, shape (n, dof)
         Rows of NaN where a point has none [rad/s, rad/s^2].
+
+    Attributes
+    ----------
     motion : Trajectory or None
-        The motion whose points they are, where they are those of one.
+        The motion whose points they are, where they are known to be those of one.
 
     Raises
     ------
@@ -81,14 +84,10 @@ class TimedPoints:
     positions: Array
     velocities: Array
     accelerations: Array
-    motion: Trajectory | None = None
+    motion: Trajectory | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         """Validate and freeze times and positions."""
-        motion = self.motion
-        if motion is not None and self.times is motion.times:
-            # They were checked, and are frozen.
-            return
         times = frozen_array(self.times, (None,), 'times', 's', MessageError)
         if not len(times) or times[0] < 0.0 or not (np.diff(times) > 0.0).all():
             raise MessageError('times: expected at least one, from >= 0, strictly increasing [s]')
@@ -225,11 +224,12 @@ def ramp_to_rest(present: ControllerState, deceleration: Array, now: float) -> C
 
 
 def points_of(motion: Trajectory) -> TimedPoints:
-    """Return the points of a motion."""
-    q, v, a = motion.states
-    return TimedPoints(
-        times=motion.times, positions=q, velocities=v, accelerations=a, motion=motion
-    )
+    """Return the points of a motion, which are those of a trajectory already."""
+    points: TimedPoints = object.__new__(TimedPoints)
+    for name in ('times', 'positions', 'velocities', 'accelerations'):
+        object.__setattr__(points, name, getattr(motion, name))
+    object.__setattr__(points, 'motion', motion)
+    return points
 
 
 def commanded_state(
