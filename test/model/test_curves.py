@@ -32,7 +32,7 @@ def is_same(one, other):
     return all(a.tobytes() == b.tobytes() for a, b in arrays)
 
 
-def test_polynomials_and_states_are_the_same_to_the_bit():
+def test_polynomials_and_states_are_those_of_numpy():
     for motion, rng in motions(300):
         if len(motion.times) > 1:
             # A processor that multiplies and adds in two steps rounds twice.
