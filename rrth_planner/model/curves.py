@@ -4,7 +4,8 @@
 What is asked of motions with every body, by compiled code.
 
 The numbers are those of `model.trajectory`, but for the rounding of a processor's products. That
-module needs no compiler, which a playback starts without; here an answer takes a tenth of the time.
+module needs no compiler, which a playback starts without; here an answer takes a tenth of the
+time.
 """
 
 import functools
