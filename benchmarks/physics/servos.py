@@ -237,8 +237,8 @@ class _Execution:
             state.positions, state.velocities, state.time, state.time, np.inf, recent
         )
 
-    def _moment(self) -> Moment:
-        now = self.arm.time
+    def _moment(self, later: float = 0.0) -> Moment:
+        now = self.arm.time + later
         return Moment(now=now, steady=now, reading=self.reading, rules=self.rules)
 
     def _look(self) -> Look:

@@ -342,9 +342,9 @@ class Planner:
         self.messages.append(sent.motion.trajectory)
         self.bodies.append(self.body(sent.commitment.start_time))
 
-    def _moment(self) -> Moment:
+    def _moment(self, later: float = 0.0) -> Moment:
         # How old what is seen may be is the node's: here it is what is varied.
-        now = self._now
+        now = self._now + later
         return Moment(now=now, steady=now, reading=self._reading, rules=self._rules)
 
     def _look(self) -> Look | None:

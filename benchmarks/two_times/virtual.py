@@ -6,6 +6,7 @@ from bisect import bisect_left
 from collections.abc import Callable, Coroutine, Sequence
 from dataclasses import dataclass, fields
 from functools import partial
+from itertools import pairwise
 import math
 from typing import Any
 
@@ -39,6 +40,8 @@ NEAR = 0.02
 # How long a plan takes that was not recorded [s].
 USUAL = 0.02
 KEEP_LOST = 2.0
+# A timer of the node is up to so late [s].
+LATE_TIMER = 0.008
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,11 +92,7 @@ def again(
         patience=PATIENCE,
         start_tolerance=START_TOLERANCE,
     )
-    took = {
-        one.event.at.now: one.event.took
-        for one in recorded
-        if isinstance(one.event, events.CommitmentTook)
-    }
+    took = _decided_in(recorded)
     first = recorded[0].event.at
     reading = next(one.event.at.reading for one in recorded if one.event.at.reading is not None)
     flight = FlightRecorder(math.inf)
@@ -112,7 +111,7 @@ def again(
         k = bisect_left(begins, timeline.now)
         near = min(attempts[max(0, k - 1) : k + 1], key=lambda one: abs(one.begin - timeline.now))
         is_known = abs(near.begin - timeline.now) < NEAR
-        return near.end - near.begin if is_known else USUAL
+        return max(near.end - timeline.now, 0.0) if is_known else USUAL
 
     host = VirtualHost(
         *(timeline, InProcessPlanner(), latency),
@@ -134,7 +133,8 @@ def again(
         is_at_once = k < len(begins) and begins[k] < sent + 10.0 * WAY
         came = begins[k] if is_at_once else sent + WAY
         timeline.at(came, partial(_begin, host, ask, PointingGoal(target)))
-    timeline.every(PERIOD, queue.follow_up, _first_follow_up(recorded) - timeline.now)
+    for time in _follow_ups(recorded, begins):
+        timeline.at(time, queue.follow_up)
     timeline.run(recorded[-1].event.at.now)
     return list(replay(read_flight(flight.to_bytes()))), outcomes
 
@@ -147,11 +147,34 @@ def _begin(
     host.begin(ask(goal))
 
 
-def _first_follow_up(recorded: Sequence[Replayed]) -> float:
-    """Return when requests were first followed up, as far as that is known [s]."""
-    first = recorded[0].event.at.now
+def _decided_in(recorded: Sequence[Replayed]) -> dict[float, float]:
+    """Return how long decisions took, by when they were begun, as far as that shows [s]."""
+    found: dict[float, float] = {}
+    for one, after in pairwise(recorded):
+        event, then = one.event, after.event
+        if isinstance(then, events.CommitmentTook):
+            found[event.at.now] = then.took
+        elif isinstance(then, events.StopFor | events.StopUnproven | events.BodyWaited):
+            found.setdefault(event.at.now, then.at.now - event.at.now)
+    return found
+
+
+def _follow_ups(recorded: Sequence[Replayed], begins: Sequence[float]) -> list[float]:
+    """
+    Return when requests were followed up: every `PERIOD`, and known where something came of it.
+
+    begins: of plans [s].
+    """
     taken = [o.event.at.now for o in recorded if isinstance(o.event, events.StopsTaken)]
-    return first + math.fmod(taken[0] - first, PERIOD) if taken else first
+    first, last = (recorded[k].event.at.now for k in (0, -1))
+    if taken:
+        first += math.fmod(taken[0] - first, PERIOD)
+    found = []
+    for time in np.arange(first, last, PERIOD):
+        # A timer is a little late now and then.
+        near = [one for one in (*taken, *begins) if abs(one - time) < LATE_TIMER]
+        found.append(min(near, default=float(time)))
+    return found
 
 
 class Nobody:
@@ -175,6 +198,9 @@ def _schedule(world: World, recorded: Sequence[Replayed]) -> None:
             world.timeline.at(reading.received, partial(world.joints_came, reading))
         if isinstance(event, events.BodyCame) and event.sight is not None:
             boxes, measured = event.sight.scene.boxes, float(event.sight.measured.max())
-            world.timeline.at(event.at.now, partial(world.frame_came, boxes, measured))
+            # Of bodies that came together the newest is checked.
+            is_newest = event.look is not None or one.watch.running is None
+            come = partial(world.frame_came, boxes, measured, is_newest)
+            world.timeline.at(event.at.now, come)
         elif isinstance(event, events.Tick):
             world.timeline.at(event.at.now, world.check)

@@ -3,6 +3,7 @@
 """The monitor of any arm without ROS: the node's decisions, carried out as the node does."""
 
 from collections.abc import Callable
+from functools import partial
 import hashlib
 
 from rrth_planner.execution.decision import Command
@@ -20,7 +21,7 @@ class Monitor:
     Parameters
     ----------
     moment : callable
-        Returns the present, with what is known now.
+        Returns the moment that comes so much later than now [s], with what is known now.
     look : callable
         Returns the wearer beside the running motion.
     send : callable
@@ -35,7 +36,7 @@ class Monitor:
     def __init__(
         self,
         rules: MonitorRules,
-        moment: Callable[[], Moment],
+        moment: Callable[[float], Moment],
         look: Callable[[], Look | None],
         send: Callable[[Command], None],
         takes: Callable[[], float] = lambda: 0.0,
@@ -71,7 +72,7 @@ class Monitor:
     def fail(self, why: str, is_replanned: bool = True, is_fault: bool | None = None) -> None:
         """Stop the arm, if it moves."""
         is_fault = not is_replanned if is_fault is None else is_fault
-        event, before = Fail(self._moment(), why, is_replanned, is_fault), self.watch
+        event, before = Fail(self._moment(0.0), why, is_replanned, is_fault), self.watch
         try:
             self._take(event, 0.0)
         except Exception:
@@ -79,7 +80,8 @@ class Monitor:
                 self.watch = pending(before, event)
                 self.flight.record(before, event, Fate.PENDING, None)
 
-    def _take(self, event: Event, waited: float) -> None:
+    def _take(self, event: Event, waited: float, since: float = 0.0) -> None:
+        """Take an event that comes so long after now: what led to it took its time [s]."""
         self.n_events += 1
         took, before = self._takes(), self.watch
         try:
@@ -91,8 +93,10 @@ class Monitor:
         self.watch = step.decision.watch
         self._note(step)
         looked = self._look
-        for happens in following(step, self._moment, lambda _: looked(), lambda: waited + took):
-            self._take(happens(), waited)
+        since += took
+        moment = partial(self._moment, since)
+        for happens in following(step, moment, lambda _: looked(), lambda: waited + since):
+            self._take(happens(), waited, since)
 
     def _note(self, step: Step) -> None:
         decision = step.decision

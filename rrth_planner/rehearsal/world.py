@@ -159,7 +159,7 @@ class World:
         # What the controller was given last.
         self.arrived: Command | None = None
         # Bodies that came while the host stood still.
-        self._waiting: list[tuple[float, tuple[Box, ...], float]] = []
+        self._waiting: list[tuple[float, tuple[Box, ...], float, bool]] = []
         if not is_drawn:
             return
         timeline, rng = self.timeline, self.rng
@@ -168,9 +168,9 @@ class World:
         timeline.every(CHECK_PERIOD, self.check, float(rng.uniform(0.0, CHECK_PERIOD)))
         timeline.every(wire.frame_period, self._frame)
 
-    def moment(self) -> Moment:
-        """Return the present, with what the monitor knows."""
-        now, overdue = self.timeline.now, ''
+    def moment(self, later: float = 0.0) -> Moment:
+        """Return the moment that comes so much later than now [s], with what is known now."""
+        now, overdue = self.timeline.now + later, ''
         if self.monitor.watch.running is not None:
             age = now - self._measured
             joints = math.inf if self._reading is None else now - self._reading.taken
@@ -292,9 +292,13 @@ class World:
             again = float(self.rng.uniform(*wire.age))
             self.timeline.after(again, lambda: self.frame_came(seen, now))
 
-    def frame_came(self, seen: tuple[Box, ...], measured: float) -> None:
-        """Have the parts that were seen at a time [s] come now."""
-        self._waiting.append((self.timeline.now, seen, measured))
+    def frame_came(self, seen: tuple[Box, ...], measured: float, is_newest: bool = True) -> None:
+        """
+        Have the parts that were seen at a time [s] come now.
+
+        is_newest: whether they are the newest ones of those that came together.
+        """
+        self._waiting.append((self.timeline.now, seen, measured, is_newest))
         if not self.is_still:
             self.read()
 
@@ -305,7 +309,7 @@ class World:
     def read(self) -> None:
         """Have all bodies seen that came, and the newest one checked."""
         waiting, self._waiting = self._waiting, []
-        for k, (came, seen, measured) in enumerate(waiting):
+        for k, (came, seen, measured, is_newest) in enumerate(waiting):
             self.on_frame(measured, tuple(box.name for box in seen))
             if not self.is_new(measured):
                 continue
@@ -315,7 +319,7 @@ class World:
             self._measured = measured
             self._recent.saw(self._scene, self.timeline.now)
             sight = Sight(self._scene, np.array([then for _, then in self._parts.values()]))
-            look = self.look() if k == len(waiting) - 1 else None
+            look = self.look() if is_newest and k == len(waiting) - 1 else None
             self.monitor.take(BodyCame(self.moment(), sight, look), self.timeline.now - came)
 
     def _deciding(self) -> float:

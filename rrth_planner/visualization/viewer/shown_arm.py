@@ -97,8 +97,8 @@ class ShownArm:
             watch, is_expected_free, motion, phase, expected
         )
 
-    def _moment(self) -> Moment:
-        now = self._now
+    def _moment(self, later: float = 0.0) -> Moment:
+        now = self._now + later
         q, v, _ = self._playback.state_at(now)
         reading = JointReading(q, v, now, now, float('inf'))
         return Moment(now=now, steady=now, reading=reading, rules=self._rules)
