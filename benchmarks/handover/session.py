@@ -405,6 +405,7 @@ class _Session:
             ),
             snapshot.goal,
             parameters,
+            *(self._monitor.watch.n_stops, self._monitor.watch.n_faults),
             joins=math.inf if handover is None else handover.joins,
             planned_from=None if handover is None else handover.before,
         )

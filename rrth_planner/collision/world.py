@@ -157,7 +157,9 @@ class World(Frozen):
             arm_validity.is_configuration_free(q, ray, self.chain, self.robot, self.obstacles)
         )
 
-    def first_free(self, q: ArrayLike, way: ArrayLike, shares: Array, n_halvings: int) -> float:
+    def first_free(
+        self, q: ArrayLike, way: ArrayLike, shares: ArrayLike, n_halvings: int
+    ) -> float:
         """
         Return the first share of a way from q, (dof,) each, at which the arm is valid, else NaN.
 
@@ -165,6 +167,7 @@ class World(Frozen):
         apart as the first is from 0; what is between the last two is halved so often.
         """
         q, way = self._configuration(q), self._configuration(way, 'way')
+        shares = float_array(shares, (None,), 'shares', '-')
         address = jit.address(self.chain)
         place = self.ray_length, address, self.robot, self.obstacles, self.bounds
         return float(arm_validity.first_free(q, way, shares, n_halvings, *place))

@@ -19,6 +19,7 @@ Q, WHOLE = np.array([0.0, -0.25, 1.5, 1.5]), np.array([0.0, 0.0, 1.0, 1.0])
 Q0, FOLDED_16 = np.array([1.0, 2.0, 1.5, 1.0]), FOLDED.astype(np.float16).astype(float)
 # What is as good as an array of its length, and what is made by the planner only.
 ALSO_TAKEN = {
+    'World.first_free shares': ('another length', 'nothing'),
     'sample times': ('another length', 'nothing', 'a number'),
     'Path waypoints': ('another length',),
     'BoxMap bounds': ('another length',),
@@ -36,6 +37,7 @@ MAP = rrth.BoxMap(
     goal=[8] * 4,
 )
 OPTIONS = rrth.RRTHOptions()
+SHARES = np.array([0.25, 0.5, 1.0])
 
 
 class Table:
@@ -144,6 +146,9 @@ CALLS = {
     'World.is_free q': (Q, world.is_free),
     'World.is_edge_valid q_from': (Q, lambda q: world.is_edge_valid(q, FOLDED)),
     'World.is_edge_valid q_to': (Q, lambda q: world.is_edge_valid(FOLDED, q)),
+    'World.first_free q': (Q, lambda q: world.first_free(q, FOLDED, SHARES, 3)),
+    'World.first_free way': (Q, lambda q: world.first_free(FOLDED, q, SHARES, 3)),
+    'World.first_free shares': (SHARES, lambda s: world.first_free(Q, FOLDED, s, 3)),
     'World.colliding_bars q': (Q, world.colliding_bars),
     'World.clearances q': (Q, world.clearances),
     'World.clearances q of many': (np.stack([Q, WHOLE]), world.clearances),
