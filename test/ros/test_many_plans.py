@@ -151,7 +151,7 @@ def test_a_hundred_motions_round_ten_bodies_have_no_contact(wait_until, send, sp
                 number = answer_from_text(answer.message).number
                 wait_until(lambda n=number: n in client.answers)
                 times.append(client.answers[number].figures['planning_time_ms'])
-                wait_until(lambda n=n_before: len(client.motions) == n + 1)
+                wait_until(lambda n=n_before: len(client.motions) >= n + 1)
                 stamp = nanoseconds_of(client.motions[-1].header.stamp)
                 assert client.answers[number].stamp == stamp
                 moved = time.monotonic()

@@ -127,12 +127,12 @@ def test_a_wearer_who_moves_into_the_way_stops_the_arm_and_it_goes_round(
     n, box = len(client.states), in_the_way(client, 1.6)
     msg, scene = body(box)
     client.body.publish(msg)
-    wait_until(lambda: len(client.motions) == 2)
+    wait_until(lambda: len(client.motions) >= 2)
     stop = client.motion(1)
     assert stop.velocities[0].any()
     assert stop.duration < client.motion(0).duration
     # It replans, or holds and reports that.
-    wait_until(lambda: len(client.motions) == 3 or 'holding' in client.figures.get('monitor', ''))
+    wait_until(lambda: len(client.motions) >= 3 or 'holding' in client.figures.get('monitor', ''))
     wait_until(lambda: client.speed() == 0.0)
     q = np.array([state.position for state in client.states[n:]])
     contact = reference_checker.first_contact(worlds.table_1_arm(), scene, q, 1.0, 0.0)
@@ -151,7 +151,7 @@ def test_a_hand_that_is_lost_in_the_way_of_a_motion_is_not_driven_into(
     # The tracker sees it once, and never again.
     msg.markers[-1].lifetime.nanosec = 10**8
     client.body.publish(msg)
-    wait_until(lambda: len(client.motions) == 2)
+    wait_until(lambda: len(client.motions) >= 2)
     wait_until(lambda: client.figures.get('lost parts') == '"hand/0"')
     wait_until(lambda: client.speed() == 0.0)
     # Where it is nobody knows: the arm stays.
@@ -181,7 +181,7 @@ def test_a_new_target_is_planned_for_while_the_arm_stops(scene_of_a_motion, wait
     msg, scene = body(box)
     send(client, client.target, samples.target(*OTHER))
     client.body.publish(msg)
-    wait_until(lambda: len(client.motions) == 2)
+    wait_until(lambda: len(client.motions) >= 2)
     future = client.plan.call_async(Trigger.Request())
     wait_until(future.done)
     # For the new target, whether the arm was at rest or in motion to the old one.
@@ -216,7 +216,7 @@ def test_a_wearer_who_moves_elsewhere_stops_nothing(scene_of_a_motion, wait_unti
 
 def test_a_body_that_stops_coming_stops_the_arm_and_it_holds(scene_of_a_motion, wait_until):
     client, said = scene_of_a_motion('body_timeout:=1.0')
-    wait_until(lambda: len(client.motions) == 2)
+    wait_until(lambda: len(client.motions) >= 2)
     wait_until(lambda: client.figures.get('monitor') == 'holding')
     wait_until(lambda: client.speed() == 0.0)
     assert any('body_timeout' in line for line in said)

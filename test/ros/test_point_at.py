@@ -192,7 +192,7 @@ def test_the_arm_points_at_the_requested_target(arm, bystander, call, wait_until
     assert ended.returncode == 0, ended.stderr
     assert ended.stdout.startswith('SUCCESS (1): ')
     assert 'the ray misses the target by' in ended.stdout
-    wait_until(lambda: len(bystander.motions) == 2)
+    wait_until(lambda: len(bystander.motions) >= 2)
 
     # A target that the planner rejects moves nothing.
     report = report_of(call, 0, 0, 0)
