@@ -163,7 +163,7 @@ def _older_body_taken() -> Patches:
 def _stale_inputs_ignored() -> Patches:
     """Go on though no body comes any more."""
     former = World.moment
-    return [(World, 'moment', lambda self: replace(former(self), overdue=''))]
+    return [(World, 'moment', lambda self, *later: replace(former(self, *later), overdue=''))]
 
 
 def _fault_without_effect() -> Patches:
