@@ -16,19 +16,12 @@ import os
 import sys
 import time
 
-from benchmarks.monitor_search.episode import Episode
-from benchmarks.monitor_search.faults import FAULTS, put_back
+from benchmarks.monitor_search.faults import FAULTS, found_of
 from benchmarks.monitor_search.judge import Found
 from benchmarks.separation.runs import each
 
 SEEDS = 60
 HEADER = '| episodes | events | commands | stops | motions begun | slow contacts | faults |'
-
-
-def found_of(fault: str, seed: int) -> Found:
-    """Return what the episode of a seed shows, with a fault in the monitor; '': none."""
-    with put_back(fault):
-        return Episode(seed).run()
 
 
 def lines_of(episodes: Sequence[Found]) -> list[str]:

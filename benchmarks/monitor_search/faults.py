@@ -31,6 +31,9 @@ from rrth_planner.model.trajectory import part_of, Trajectory
 from rrth_planner.rehearsal.world import World
 from rrth_planner.timing.fast_stop import fast_stop as fast_stop_of
 
+from benchmarks.monitor_search.episode import Episode
+from benchmarks.monitor_search.judge import Found
+
 Patches = list[tuple[Any, str, Any]]
 
 
@@ -267,3 +270,9 @@ def _held(patches: Patches) -> Iterator[None]:
 def put_back(name: str) -> AbstractContextManager[None]:
     """Put a fault into the monitor, by its name; '': none."""
     return _held(FAULTS[name]() if name else [])
+
+
+def found_of(fault: str, seed: int) -> Found:
+    """Return what the episode of a seed shows, with a fault in the monitor; '': none."""
+    with put_back(fault):
+        return Episode(seed).run()

@@ -6,7 +6,8 @@ import pytest
 
 pytest.importorskip('tqdm')
 
-from benchmarks.monitor_search.__main__ import found_of, main
+from benchmarks.monitor_search.__main__ import main
+from benchmarks.monitor_search.faults import found_of
 
 SEEDS = (0, 1, 2)
 
@@ -30,3 +31,11 @@ def test_the_command_prints_a_table_and_ends_with_1_where_there_is_a_fault(capsy
     out = capsys.readouterr().out
     assert '| episodes | events |' in out
     assert 'seed 0: a command does not end at rest' in out
+
+
+def test_processes_beside_each_other_find_what_one_does(capsys):
+    tables = []
+    for jobs in ('1', '2'):
+        assert main(['--seeds', '2', '--jobs', jobs]) == 0
+        tables.append(capsys.readouterr().out.splitlines()[:-1])
+    assert tables[0] == tables[1]
