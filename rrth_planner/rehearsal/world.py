@@ -128,6 +128,7 @@ class World:
         None: that is drawn, too.
         """
         self.rules, self.wearer, self.wire = rules, wearer, wire
+        self._is_drawn = is_drawn
         self.rng = np.random.default_rng(seed)
         self.timeline = Timeline(begin)
         self.arm = LaggingArm(q, controller_period, lag, controller, begin, state_at)
@@ -170,7 +171,8 @@ class World:
 
     def moment(self, later: float = 0.0) -> Moment:
         """Return the moment that comes so much later than now [s], with what is known now."""
-        now, overdue = self.timeline.now + later, ''
+        # Where it is drawn what happens, a decision takes time on its way to the controller only.
+        now, overdue = self.timeline.now + (0.0 if self._is_drawn else later), ''
         if self.monitor.watch.running is not None:
             age = now - self._measured
             joints = math.inf if self._reading is None else now - self._reading.taken
