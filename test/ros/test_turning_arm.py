@@ -61,6 +61,13 @@ class Driver(Node):
         self.joints.publish(reported)
 
 
+def plays(driver):
+    """Return whether both subscriptions of a playback are there, and no other playback's."""
+    listeners = driver.get_subscriptions_info_by_topic('joint_trajectory')
+    names = [listener.node_name for listener in listeners]
+    return driver.states and names.count('arm_playback') == 2
+
+
 def test_every_motion_begins_at_the_reading_and_ends_on_the_target(
     tmp_path, wait_until, send, ask, spinning
 ):
@@ -76,12 +83,6 @@ def test_every_motion_begins_at_the_reading_and_ends_on_the_target(
             [*ros, f'initial_positions:=[{pan}, 0.0]', '-r', 'joint_states:=true_states'],
             said.append,
         )
-
-    def is_listening():
-        """Return whether both subscriptions of the new playback are there, and no others."""
-        listeners = driver.get_subscriptions_info_by_topic('joint_trajectory')
-        names = [listener.node_name for listener in listeners]
-        return driver.states and names.count('arm_playback') == 2
 
     def told(words):
         """Return how many lines of the nodes begin with some words, their level aside."""
@@ -125,14 +126,14 @@ def test_every_motion_begins_at_the_reading_and_ends_on_the_target(
         # A driver that counts: it is started again, at another turn each time.
         for pan, way in ((3.1, 0.5), (9.0, 2.0), (-17.0, 1.0)):
             with playback(pan):
-                wait_until(is_listening)
+                wait_until(lambda: plays(driver))
                 begin, first, end = go(way)
                 assert np.abs(first - begin).max() < 1e-9
                 assert begin[0] == pan and end[0] == pytest.approx(pan + way, abs=1e-6)
         # One that wraps: the arm goes round and round, and the count goes on.
         driver.wraps = True
         with playback(3.0):
-            wait_until(is_listening)
+            wait_until(lambda: plays(driver))
             for way in (2.0, 2.0, 2.5, -2.5, -2.5, -2.5, -2.5):
                 begin, first, end = go(way)
                 assert np.abs(first - begin).max() < 1e-9
@@ -153,7 +154,12 @@ def test_point_at_follows_an_arm_whose_driver_wraps(tmp_path, wait_until, send, 
     def pointed_at(angle, *options):
         """Return what the command reports of a target in a direction [rad]."""
         target = [f'{x:.9f}' for x in (2.0 * np.cos(angle), 2.0 * np.sin(angle), 0.3)]
-        ended = call(point_at.main, '--json', *options, '--', *target)
+        while True:
+            ended = call(point_at.main, '--json', *options, '--', *target)
+            # On a busy machine the playback may miss a motion before the planner knows of it.
+            is_missed = not any('executing' in line for line in said)
+            if ended.returncode != point_at.NOT_ARRIVED or not is_missed:
+                break
         report = json.loads(ended.stdout)
         assert ended.returncode == 0, (report, ended.stderr, said)
         assert report['pointing_error'] < 1e-3
@@ -169,7 +175,7 @@ def test_point_at_follows_an_arm_whose_driver_wraps(tmp_path, wait_until, send, 
         spinning(driver),
     ):
         wait_until(driver.plan.service_is_ready, 240.0)
-        wait_until(lambda: driver.states)
+        wait_until(lambda: plays(driver))
         send(driver, driver.body, samples.array(samples.box('far', center=[0.0, 0.0, -5.0])))
         # Across half a turn, on through the next one, and back.
         for pan in (4.0, 6.5, 9.0, 7.0):

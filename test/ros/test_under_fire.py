@@ -30,7 +30,8 @@ from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
 from rosgraph_msgs.msg import Clock  # noqa: E402
-from rrth_planner.execution.tracked_motion import forget_command  # noqa: E402
+from rrth_planner.execution.tracked_motion import TrackedMotion  # noqa: E402
+from rrth_planner.execution.watch import MonitorState  # noqa: E402
 from rrth_planner.model.errors import LONGEST_SENTENCE  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
 from rrth_planner.ros.planner import PlannerNode  # noqa: E402
@@ -251,19 +252,19 @@ class Wire:
         assert self.listener.count(before + answer.success) == before + answer.success
         return answer
 
-    def is_well(self):
-        """Return whether good messages are taken, and planned with."""
-        # The arm has executed nothing: what it was commanded before does not count.
-        monitor = self.planner._monitor
-        know(monitor, tracked=forget_command(monitor.watch.tracked))
+    def check(self):
+        """Check that good messages are taken, and planned with."""
+        # The arm has executed nothing: there is neither a command nor a motion to stop.
+        idle = {'tracked': TrackedMotion(), 'state': MonitorState.IDLE, 'pending': None}
+        know(self.planner._monitor, **idle)
         good = {'body': wearer(), 'target': target(), 'joints': joints()}
-        if not all(self.say(name, msg) for name, msg in good.items()):
-            return False
+        for name, msg in good.items():
+            assert self.say(name, msg), self.inputs.all[name].rejection
         answer = self.plan()
         while answer.message.startswith('TIMED_OUT'):
             # A busy machine.
             answer = self.plan()
-        return answer.success
+        assert answer.success, answer.message
 
 
 @pytest.fixture(name='wire', scope='module')
@@ -395,11 +396,11 @@ def test_bytes_that_are_no_message_are_rejected(wire, name, data, header):
 @settings(max_examples=60, deadline=None)
 @given(body=ARRAYS, aim=TARGETS, state=STATES)
 def test_every_request_is_answered_and_the_next_good_one_succeeds(wire, body, aim, state):
-    assert wire.is_well()
+    wire.check()
     for name, msg in (('body', body), ('target', aim), ('joints', state)):
         wire.say(name, msg)
     wire.plan()
-    assert wire.is_well()
+    wire.check()
 
 
 @settings(max_examples=60, deadline=None)
@@ -408,7 +409,7 @@ def test_every_request_is_answered_and_the_next_good_one_succeeds(wire, body, ai
     v=st.lists(st.one_of(st.floats(-1.6, 1.6), NUMBERS), min_size=4, max_size=4),
 )
 def test_any_moving_arm_gets_a_handover_or_a_rejection(wire, q, v):
-    assert wire.is_well()
+    wire.check()
     wire.say('joints', joints(np.add(FOLDED, q).tolist(), velocity=v))
     wire.say('body', wearer())
     wire.plan()
@@ -460,7 +461,7 @@ def test_any_parameter_is_taken_or_rejected_in_a_sentence(wire, name, value):
 
 
 def test_after_all_of_this_a_good_plan_succeeds(wire):
-    assert wire.is_well()
+    wire.check()
 
 
 def good_motion():
