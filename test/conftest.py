@@ -16,7 +16,11 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 from contextlib import ExitStack  # noqa: E402
 
 from benchmarks.common.processors import lose_time_asleep, OnEachProcessor, stay_awake  # noqa: E402
+from hypothesis import settings  # noqa: E402
 
+# How long an example takes says how busy the machine is.
+settings.register_profile('untimed', deadline=None)
+settings.load_profile('untimed')
 _session = ExitStack()
 
 

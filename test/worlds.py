@@ -65,7 +65,6 @@ def examples(n):
     """Return the settings of a property test: n cases, the same ones on every run."""
     return settings(
         max_examples=n,
-        deadline=None,
         derandomize=True,
         database=None,
         suppress_health_check=list(HealthCheck),

@@ -4,7 +4,7 @@
 
 from bisect import bisect_left
 from collections.abc import Callable, Coroutine, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 import math
@@ -18,13 +18,7 @@ from rrth_planner.execution.handover import LATE, LEADS
 from rrth_planner.io.settings import load_settings
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner
-from rrth_planner.rehearsal.parameters import RehearsedParameters
-from rrth_planner.rehearsal.rehearsal import (
-    BODY_TIMEOUT,
-    JOINT_TIMEOUT,
-    PATIENCE,
-    START_TOLERANCE,
-)
+from rrth_planner.rehearsal.parameters import rehearsed_parameters
 from rrth_planner.rehearsal.virtual_ends import LastWord, MonitorEnd, NoPublishers, VirtualInputs
 from rrth_planner.rehearsal.virtual_host import VirtualHost
 from rrth_planner.rehearsal.world import Wire, World
@@ -80,17 +74,10 @@ def again(
     """
     rules, recorded = course.rules, course.events
     delay = rules.execution.controller_delay
-    settings = load_settings(rules.required.arm.dof, seed=seed)
-    parameters = RehearsedParameters(
-        **{field.name: getattr(settings, field.name) for field in fields(settings)},
-        arm=rules.required.arm,
-        stop_limits=rules.stop_limits,
-        execution=rules.execution,
-        body_timeout=BODY_TIMEOUT,
-        joint_timeout=JOINT_TIMEOUT,
-        keep_lost=KEEP_LOST,
-        patience=PATIENCE,
-        start_tolerance=START_TOLERANCE,
+    arm = rules.required.arm
+    settings = load_settings(arm.dof, seed=seed)
+    parameters = rehearsed_parameters(
+        *(settings, arm, rules.stop_limits, rules.execution, KEEP_LOST)
     )
     took = _decided_in(recorded)
     first = recorded[0].event.at

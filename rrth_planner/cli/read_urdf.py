@@ -195,7 +195,7 @@ def _report(found: ImportedArm) -> list[str]:
     arm, chain = found.arm, found.chain
     lines = [f'arm "{chain.name}" of {arm.dof} joints, from {chain.base} to {chain.tool}']
     for k, name in enumerate(arm.joint_names):
-        unit = 'm' if arm.is_prismatic[k] else 'rad'
+        unit = arm.units[k]
         low, high = arm.bounds[:, k]
         note = f', {high / math.tau:g} turns either way' if arm.is_continuous[k] else ''
         radius = '' if arm.radii[k] == NO_BARS else f', radius {arm.radii[k]:.4f} m'

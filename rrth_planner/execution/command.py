@@ -84,8 +84,8 @@ def led(lead: Trajectory, after: ExecutingMotion) -> ExecutingMotion:
     if not continues(lead, motion):
         q, v, a = _gaps(lead, motion)
         raise RrthError(
-            f'the motion begins {q:.2g} rad, {v:.2g} rad/s and {a:.2g} rad/s^2 from what is '
-            f'commanded then, expected at most {SAME_STATE[0]:g}, {SAME_STATE[1]:g} and '
+            f'the motion begins {q:.2g} rad (or m), {v:.2g} rad/s and {a:.2g} rad/s^2 from what '
+            f'is commanded then, expected at most {SAME_STATE[0]:g}, {SAME_STATE[1]:g} and '
             f'{SAME_STATE[2]:g}'
         )
     end = lead.duration

@@ -120,7 +120,7 @@ def permitted(motion: Trajectory, time: float, body: SeenBody, settings: Separat
     n = max(2, math.ceil(ahead / SPACING_AHEAD) + 1)
     places = np.linspace(time, time + ahead, n)
     n_rates, margin = min(n, N_RATES), settings.margin + JUMP_WAY
-    reserve = RESERVE if _has_sharp_stops(settings) else 1.0
+    reserve = RESERVE if has_sharp_stops(settings) else 1.0
     found = permitted_ahead(motion, places, n_rates, body, settings, margin, reserve)
     rates, slows, fades = found.T
     places = places[:n_rates]
@@ -193,10 +193,10 @@ def is_in_sharp_stop(commitment: Commitment, time: float, settings: Separation) 
     """
     elapsed = time - commitment.start_time
     is_stopping = commitment.stretch < elapsed < commitment.trajectory.duration
-    return is_stopping and _has_sharp_stops(settings)
+    return is_stopping and has_sharp_stops(settings)
 
 
-def _has_sharp_stops(settings: Separation) -> bool:
+def has_sharp_stops(settings: Separation) -> bool:
     """Return whether stops have more jerk than motions."""
     return bool((settings.stop_limits.jerk > settings.limits.jerk).any())
 

@@ -19,6 +19,7 @@ from rrth_planner.execution.commitment import (
     Commitment,
     extended,
     first_commitment,
+    has_sharp_stops,
     is_in_sharp_stop,
     JUMP_WAY,
     path_state,
@@ -35,8 +36,9 @@ from rrth_planner.model.trajectory import Trajectory
 
 # At a lower rate the arm is slowed down for the wearer.
 FULL_RATE = 0.995
-# At rest on its way the arm goes on once nothing has kept it from that for so long [s].
-RESUME_AFTER = 0.2
+# At rest on its way the arm goes on once nothing has kept it from that for so long; where stops
+# are sharper than motions, and it goes on from rest only, for the shorter time [s].
+RESUME_AFTER, RESUME_AFTER_SHARP = 0.2, 0.05
 # What comes less often is no stream of bodies [s]; how fast a long pause between two is forgotten.
 LONGEST_PERIOD, FADING = 0.25, 0.98
 # A commitment lasts until the next one begins: the period of the bodies times so much, and by how
@@ -333,6 +335,12 @@ def is_arrived(known: Commitments, now: float) -> bool:
     return phase_at(known, max(now, present.end_time)) >= present.motion.duration - ARRIVED
 
 
+def stops_sharply(known: Commitments) -> bool:
+    """Return whether the stops of the running motion are sharper than motions may be."""
+    separation = None if known.rules is None else known.rules.separation
+    return separation is not None and has_sharp_stops(separation)
+
+
 def waits_for_reset(known: Commitments, now: float) -> bool:
     """Return whether the motion is on its way, and a stop there lasts until a reset."""
     is_manual = known.rules is not None and known.rules.is_manual
@@ -516,7 +524,8 @@ def _may_resume(known: Commitments, now: float, rules: ExecutionRules) -> bool:
     """Return whether a motion that came to rest on its way may go on, if that is proven."""
     if rules.is_manual and not known.is_reset:
         return False
-    return not 0.0 < now - known.blocked < RESUME_AFTER
+    after = RESUME_AFTER_SHARP if stops_sharply(known) else RESUME_AFTER
+    return not 0.0 < now - known.blocked < after
 
 
 def _find_present(known: Commitments, reading: JointReading | None) -> Commitments:

@@ -107,6 +107,8 @@ NOT_SEPARATE = 'the remaining motion is no longer proven separate from the weare
 MARGIN_LEFT = 0.5
 # With separation it goes on for so long while the wearer is in the way further on [s].
 PATIENCE = 0.3
+# An arm with sharp stops rests for so long on its way before its motion is planned again [s].
+SHARP_GRACE = 0.1
 # Why a whole motion is stopped that began beside a body that stands still.
 STREAM_BEGAN = 'bodies come as a stream now: from here on motions are proven separate from it'
 # So long after the clock was set no motion begins: what was measured before, and came after, is
@@ -540,7 +542,14 @@ def _phase(watch: Watch, at: Moment) -> tuple[Decision, float | None]:
     """Return the time within the running motion; None where it is over or unknown [s]."""
     known, is_monitoring = watch.commitments, watch.is_monitoring
     is_waiting = is_monitoring and given.waits_for_reset(known, at.now)
-    if is_over(watch.tracked, at.reading, at.now) and not is_waiting:
+    # An arm that stops sharply goes on from rest only: another way is looked for sooner.
+    is_stuck = (
+        is_monitoring
+        and given.stops_sharply(known)
+        and is_over(watch.tracked, at.reading, at.now, SHARP_GRACE)
+        and not given.is_arrived(known, at.now)
+    )
+    if (is_stuck or is_over(watch.tracked, at.reading, at.now)) and not is_waiting:
         found = Decision(watch=watch)
         if is_monitoring and not given.is_arrived(known, at.now):
             found = _given_up(watch, at, TOO_NEAR)

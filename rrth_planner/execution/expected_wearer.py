@@ -40,6 +40,14 @@ def expected_scene(before: Scene, present: Scene, elapsed: float) -> Scene:
     return scene_of_rows(tuple([present.names[i] for i in places.tolist()]), rows)
 
 
+def joined(present: Scene, expected: Scene) -> Scene:
+    """Return a wearer as he is and as he will be soon; as he is where there is no room for it."""
+    if not 0 < len(expected.boxes) <= MAX_BOXES - len(present.boxes):
+        return present
+    names, rows = present.names + expected.names, [present.numbers, expected.numbers]
+    return scene_of_rows(names, np.concatenate(rows))
+
+
 def is_expected_free(
     running: ExecutingMotion, phase: float, required: RequiredClearance, expected: Scene
 ) -> bool:

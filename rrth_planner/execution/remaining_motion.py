@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Checks of the remaining motion against the present wearer."""
 
-import numpy as np
 from rrth_planner.collision.box_tree import tree_depth
 from rrth_planner.collision.certificate import BERNSTEIN_3, BERNSTEIN_4, FINENESS
 from rrth_planner.collision.penetration import gets_no_deeper, leads_out
@@ -95,7 +94,16 @@ def escapes_by_continuing(
 
 def is_ray_clear(q: Array, required: RequiredClearance, scene: Scene) -> bool:
     """Return whether the pointing ray of an arm at q, (dof,), is clear by the margin."""
-    return bool(world_of(required, scene).clearances(q)[-1].min(initial=np.inf) > 0.0)
+    return not box_in_ray(q, required, scene)
+
+
+def box_in_ray(q: Array, required: RequiredClearance, scene: Scene) -> str:
+    """Return which box is nearest to the pointing ray, at q (dof,); empty: it is clear of all."""
+    if not scene.boxes:
+        return ''
+    gaps = world_of(required, scene).clearances(q)[-1]
+    nearest = int(gaps.argmin())
+    return scene.names[nearest] if gaps[nearest] <= 0.0 else ''
 
 
 def is_place_free(q: Array, required: RequiredClearance, scene: Scene) -> bool:

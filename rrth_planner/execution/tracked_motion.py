@@ -180,13 +180,15 @@ def shifted(tracked: TrackedMotion, step: float) -> TrackedMotion:
     )
 
 
-def is_over(tracked: TrackedMotion, reading: JointReading | None, now: float) -> bool:
-    """Return whether the motion, if there is one, has ended and the arm is at rest."""
+def is_over(
+    tracked: TrackedMotion, reading: JointReading | None, now: float, grace: float = GRACE
+) -> bool:
+    """Return whether the motion, if there is one, ended so long ago [s] and the arm is at rest."""
     motion = tracked.motion
     if motion is None or reading is None:
         return False
     since = now - motion.start_time - motion.trajectory.duration
-    return since > GRACE + tracked.delay and not reading.is_moving(now)
+    return since > grace + tracked.delay and not reading.is_moving(now)
 
 
 def tracked_phase(

@@ -50,7 +50,7 @@ def write_motion(
     Raise RecordError where it has another one, OSError where it cannot be written.
     """
     check_suffix(path)
-    units = ['m' if slides else 'rad' for slides in arm.is_prismatic]
+    units = arm.units
     if path.suffix.lower() == '.csv':
         text = _to_csv(arm.joint_names, units, trajectory)
     else:

@@ -199,6 +199,11 @@ class ArmModel(Frozen):
         """Number of joints."""
         return len(self.joint_names)
 
+    @property
+    def units(self) -> tuple[str, ...]:
+        """The units of its joint positions: rad, or m where one slides."""
+        return tuple(['m' if slides else 'rad' for slides in self.is_prismatic])
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bar:

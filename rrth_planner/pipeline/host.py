@@ -13,6 +13,8 @@ from rrth_planner.pipeline.planning_process import Planner
 from rrth_planner.pipeline.request import PlanQuestion
 
 T = TypeVar('T')
+# A planner that hangs is given up so long after its time limit, or after any other question [s].
+LONGEST_ANSWER = 5.0
 
 
 class Host(Protocol):

@@ -107,7 +107,7 @@ def led_in_sentence(arm: ArmModel, q_start: Array) -> str:
     """Return the joints that are led in from beyond a limit, and how far, as a sentence."""
     parts = []
     for k in joints_beyond(arm, q_start).tolist():
-        unit = 'm' if arm.is_prismatic[k] else 'rad'
+        unit = arm.units[k]
         excess = abs(q_start[k] - np.clip(q_start[k], *arm.bounds[:, k]))
         parts.append(f'{arm.joint_names[k]} led in from {excess:.2g} {unit} beyond its limit')
     return ', '.join(parts)
@@ -115,7 +115,7 @@ def led_in_sentence(arm: ArmModel, q_start: Array) -> str:
 
 def _place_sentence(arm: ArmModel, q: Array, k: int) -> str:
     low, high = arm.bounds[:, k]
-    unit = 'm' if arm.is_prismatic[k] else 'rad'
+    unit = arm.units[k]
     return f'{arm.joint_names[k]} is at {q[k]:.6g} {unit}, expected {low:.6g} to {high:.6g} {unit}'
 
 
@@ -152,7 +152,7 @@ def lead_rejection(
     k = int(fastest.max(axis=0).argmax())
     if fastest[:, k].max() > 1.0 + EXCESS:
         speed = np.abs(lead.trajectory.velocities[:, k]).max()
-        unit = 'm/s' if arm.is_prismatic[k] else 'rad/s'
+        unit = f'{arm.units[k]}/s'
         return Rejection(
             PlanStatus.START_MOVES,
             f'{arm.joint_names[k]} moves at up to {speed:.3f} {unit}, expected at most '
@@ -163,7 +163,7 @@ def lead_rejection(
     beyond = np.maximum(low - ways, ways - high).max(axis=0)
     k = int(beyond.argmax())
     if beyond[k] > ROUNDING:
-        unit = 'm' if arm.is_prismatic[k] else 'rad'
+        unit = arm.units[k]
         return Rejection(
             PlanStatus.START_MOVES,
             f'{arm.joint_names[k]} moves too fast to stop straight ahead: it would pass its '

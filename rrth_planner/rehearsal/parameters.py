@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The parameters of a rehearsed planner."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 from rrth_planner.execution.commitments import ExecutionRules
@@ -10,6 +10,9 @@ from rrth_planner.io.settings import PlanSettings, required_clearance
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.required_clearance import RequiredClearance
 from rrth_planner.model.trajectory import MotionLimits
+
+# As the planner node has them by default [rad], [s].
+START_TOLERANCE, BODY_TIMEOUT, JOINT_TIMEOUT, PATIENCE = 0.002, 0.2, 0.2, 5.0
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -52,3 +55,24 @@ class RehearsedParameters(PlanSettings):
     def incident_path(self) -> Path:
         """Where nothing is written: a rehearsal writes no files."""
         return Path()
+
+
+def rehearsed_parameters(
+    settings: PlanSettings,
+    arm: ArmModel,
+    stop_limits: MotionLimits,
+    execution: ExecutionRules,
+    keep_lost: float,
+) -> RehearsedParameters:
+    """Return settings of plans as the parameters of a node; keep_lost [s]."""
+    return RehearsedParameters(
+        **{field.name: getattr(settings, field.name) for field in fields(settings)},
+        arm=arm,
+        stop_limits=stop_limits,
+        execution=execution,
+        body_timeout=BODY_TIMEOUT,
+        joint_timeout=JOINT_TIMEOUT,
+        keep_lost=keep_lost,
+        patience=PATIENCE,
+        start_tolerance=START_TOLERANCE,
+    )

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A rehearsal: a scenario in virtual time, and what was seen of it."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import lru_cache, partial
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.separation import Separation, SeparationRules
 from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner
-from rrth_planner.rehearsal.parameters import RehearsedParameters
+from rrth_planner.rehearsal.parameters import BODY_TIMEOUT, JOINT_TIMEOUT, rehearsed_parameters
 from rrth_planner.rehearsal.rehearsed_wearer import (
     HAND_PERIOD,
     Hidden,
@@ -41,8 +41,6 @@ from rrth_planner.simulation.trajectory_controller import ControllerRules, Contr
 
 # Where the arm begins [rad].
 FOLDED = (0.0, -0.35, 0.5 * np.pi, 0.5 * np.pi)
-# As the planner node has them by default [rad], [s].
-START_TOLERANCE, BODY_TIMEOUT, JOINT_TIMEOUT, PATIENCE = 0.002, 0.2, 0.2, 5.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,17 +109,8 @@ def rehearsed(
         limits=settings.limits,
         stop_limits=stop_limits,
     )
-    parameters = RehearsedParameters(
-        **{field.name: getattr(settings, field.name) for field in fields(settings)},
-        arm=arm,
-        stop_limits=stop_limits,
-        execution=ExecutionRules(separation, execution.delay, False),
-        body_timeout=BODY_TIMEOUT,
-        joint_timeout=JOINT_TIMEOUT,
-        keep_lost=tracker.keep_lost,
-        patience=PATIENCE,
-        start_tolerance=START_TOLERANCE,
-    )
+    rules = ExecutionRules(separation, execution.delay, False)
+    parameters = rehearsed_parameters(settings, arm, stop_limits, rules, tracker.keep_lost)
     person = _person(scenario)
     world = World(
         parameters,

@@ -192,6 +192,9 @@ class LastWord:
     def given_up(self, why: str) -> None:
         """Do nothing."""
 
+    def ray_blocked_by(self, box: str) -> None:
+        """Do nothing."""
+
     def nothing_runs(self) -> None:
         """Do nothing."""
 

@@ -9,14 +9,13 @@ from typing import Any, TypeVar
 
 from rrth_planner.collision.violation import Violation
 from rrth_planner.execution.coroutines import Coroutines
+from rrth_planner.pipeline.host import LONGEST_ANSWER
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.planning_process import Planner, PlanningProcessError
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.rehearsal.timeline import Timeline
 
 T = TypeVar('T')
-# A planner that has not answered so long after its time limit is replaced [s].
-GRACE = 5.0
 # A plan has as long as it needs: what a clock ends differs from run to run [s].
 UNLIMITED = 3600.0
 # The second checker answers after so long, if nothing else is said [s].
@@ -94,7 +93,7 @@ class VirtualHost:
         self.n_plans += 1
         limit = question.options.time_limit
         if self._is_dead():
-            longest = limit + GRACE
+            longest = limit + LONGEST_ANSWER
             await self.sleep(longest)
             raise PlanningProcessError(f'the planner has not answered within {longest:g} s')
         unlimited = replace(question.options, time_limit=UNLIMITED)

@@ -110,6 +110,9 @@ class Report(Protocol):
     def given_up(self, why: str) -> None:
         """Report that this goal is given up."""
 
+    def ray_blocked_by(self, box: str) -> None:
+        """Report what an arm at rest waits for to leave its pointing ray; empty: nothing."""
+
     def nothing_runs(self) -> None:
         """Take note that the arm executes no motion."""
 

@@ -161,7 +161,7 @@ def _rejection(
 ) -> RequestError:
     speeds = np.abs(velocities)
     k = int(np.argmax(np.where(np.isnan(speeds), np.inf, speeds)))
-    unit = 'm/s' if arm.is_prismatic[k] else 'rad/s'
+    unit = f'{arm.units[k]}/s'
     expected = expected.format(unit=unit)
     sentence = f'{arm.joint_names[k]} moves at {speeds[k]:.3f} {unit}, expected {expected}'
     return kind(ErrorCode.START_STATE_INVALID, sentence)

@@ -9,12 +9,14 @@ import math
 import numpy as np
 from rrth_planner.execution.command import ahead
 from rrth_planner.execution.executing_motion import ExecutingMotion
+from rrth_planner.execution.expected_wearer import joined
 from rrth_planner.execution.handover import Handover, LATE, LEADS
 from rrth_planner.io.incident import disagreement_incident
 from rrth_planner.model.arrays import Array, FARTHEST
 from rrth_planner.model.errors import RequestError, RrthError
 from rrth_planner.model.goal import PointingGoal
-from rrth_planner.model.status import ErrorCode
+from rrth_planner.model.scene import Scene
+from rrth_planner.model.status import ErrorCode, PlanStatus
 from rrth_planner.model.trajectory import MotionState, sample
 from rrth_planner.pipeline.host import Host
 from rrth_planner.pipeline.motion_plan import MotionPlan
@@ -100,7 +102,9 @@ async def plan_request(
             seed = host.new_seed() if parameters.seed < 0 else parameters.seed
             age = inputs.body_age(now)
             question = _question(snapshot, parameters, handover, q_start, age, seed)
-            plan = await host.plan(question, should_stop)
+            question, plan = await _plan_round(
+                inputs.expected_scene(), question, host, should_stop
+            )
             for _ in range(MOST_SLOWER):
                 if not is_too_short(plan, snapshot.goal):
                     break
@@ -117,8 +121,8 @@ async def plan_request(
             gap = float(np.abs(plan.trajectory.positions[0] - question.q_start).max())
             if not gap <= parameters.start_tolerance:
                 raise RrthError(
-                    f'the planned motion begins {gap:.4f} rad from the start that was asked for, '
-                    f'expected at most {parameters.start_tolerance:g} rad'
+                    f'the planned motion begins {gap:.4f} rad (or m) from the start that '
+                    f'was asked for, expected at most {parameters.start_tolerance:g}'
                 )
             if handover is not None:
                 if host.now() > handover.time:
@@ -162,6 +166,23 @@ def require_not_cancelled(
     """Raise RequestError where a request was cancelled."""
     if should_stop():
         raise RequestError(ErrorCode.PREEMPTED, sentence)
+
+
+async def _plan_round(
+    expected: Scene, question: PlanQuestion, host: Host, should_stop: Callable[[], bool]
+) -> tuple[PlanQuestion, MotionPlan]:
+    """
+    Return a plan, with its question: round where moving parts will be soon, if there is a way.
+
+    Else round the wearer as he is; whether that motion may begin is seen before it is published.
+    """
+    both = joined(question.scene, expected)
+    if both is not question.scene:
+        wider = replace(question, scene=both)
+        plan = await host.plan(wider, should_stop)
+        if plan.status is PlanStatus.SOLVED and plan.escape_time == 0.0:
+            return wider, plan
+    return question, await host.plan(question, should_stop)
 
 
 async def _wait_for(handover: Handover, host: Host, should_stop: Callable[[], bool]) -> None:

@@ -15,11 +15,12 @@ from rrth_planner.execution.coroutines import Wait
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.flight_recorder import MEMORY
 from rrth_planner.execution.joint_reading import JointReading
-from rrth_planner.execution.remaining_motion import is_place_free
+from rrth_planner.execution.remaining_motion import box_in_ray, is_place_free
 from rrth_planner.execution.separation_status import NO_PROMISE
 from rrth_planner.execution.watch import Stop
 from rrth_planner.io.incident import Incident
 from rrth_planner.model.errors import LONGEST_SENTENCE, one_line, RecordError, RequestError
+from rrth_planner.model.frozen import changed
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.stamp import stamp_of
 from rrth_planner.model.status import ErrorCode
@@ -45,8 +46,9 @@ PERIOD, SHORTEST_SHOW = 0.05, 0.2
 LONGEST_SETTLING = 1.0
 # A request that the wearer was in the way of is planned again after this time [s].
 AGAIN = 0.01
-# A wearer whose hand is in the ray of an arm at rest has so long to take it out [s].
-RAY_PATIENCE = 2.0
+# A wearer whose hand is in the ray of an arm at rest, or about to be, has so long to take it
+# out [s].
+RAY_PATIENCE = 4.0
 # After a stop the same goal is tried so often [s].
 RESUME_PERIOD = 0.05
 # It is waited for so long, each time, until it is known whether the body stands still [s].
@@ -282,10 +284,16 @@ class PlanQueue:
         After a time [s], or `time_limit`, the last outcome stands.
         """
         longest = parameters.options.time_limit if patience is None else patience
-        monitor, end = self._monitor, self._host.steady() + longest
+        monitor, begin = self._monitor, self._host.steady()
         n_faults = monitor.watch.n_faults
-        await self._await_clear_ray(parameters, ticket)
+        end, latest = begin + longest, begin + min(RAY_PATIENCE, parameters.options.time_limit)
         while True:
+            begin = self._host.steady()
+            blocked = await self._await_clear_ray(parameters, ticket, latest)
+            if blocked is not None:
+                return blocked
+            # What the wearer took does not count.
+            end += self._host.steady() - begin
             n_stops = monitor.watch.n_stops
 
             async def publish(
@@ -336,34 +344,59 @@ class PlanQueue:
                 'stands still, or a stream of them',
             )
 
-    async def _await_clear_ray(self, parameters: RequestParameters, ticket: _Ticket) -> None:
+    async def _await_clear_ray(
+        self, parameters: RequestParameters, ticket: _Ticket, latest: float
+    ) -> Outcome | None:
         """
-        Let a wearer who moves take a hand out of the pointing ray of an arm at rest.
+        Let the wearer take a hand out of the pointing ray of an arm at rest, until a time [s].
 
-        Whatever the arm did, its ray would sweep over the hand first.
+        Whatever the arm did, its ray would sweep over the hand first. Return how the request ends
+        where it stays there, or another one has come; None: the ray is clear, or nothing is known
+        of a wearer who moves.
         """
-        end = self._host.steady() + min(RAY_PATIENCE, parameters.options.time_limit)
-        while (
-            self._inputs.is_wearer_moving()
-            and self._is_ray_crossed(parameters)
-            and self._host.steady() < end
-            and not ticket.is_cancelled
-        ):
-            await self._host.sleep(AGAIN)
+        box, is_held = self._crossing_ray(parameters), False
+        try:
+            while box and not ticket.is_cancelled:
+                if any(other.request > ticket.request for other in self._open):
+                    return Outcome(*OVERTAKEN)
+                if self._host.steady() >= latest:
+                    return Outcome(
+                        ErrorCode.START_STATE_IN_COLLISION,
+                        f'RAY_BLOCKED: {box} is in the pointing ray of the arm at rest, or about '
+                        'to be, which would sweep over it: expected the ray clear',
+                    )
+                is_held = True
+                self._report.ray_blocked_by(box)
+                await self._host.sleep(AGAIN)
+                box = self._crossing_ray(parameters)
+            return None
+        finally:
+            if is_held:
+                self._report.ray_blocked_by('')
 
-    def _is_ray_crossed(self, parameters: RequestParameters) -> bool:
-        """Return whether the arm rests, clear of the wearer but for its pointing ray."""
+    def _crossing_ray(self, parameters: RequestParameters) -> str:
+        """
+        Return which box is in the pointing ray of an arm at rest, or will be soon.
+
+        Empty: none is; the arm moves, or is itself too near to the wearer and has to leave; or he
+        stands still, and would leave the ray to the arm.
+        """
+        if parameters.execution.separation is None and not self._inputs.is_wearer_moving():
+            return ''
         now, required = self._host.now(), parameters.required
         try:
             joints = self._inputs.joints_at(now, parameters.joint_timeout)
             scene = self._inputs.scene_at(now, parameters)
         except RequestError:
-            return False
+            return ''
         if joints.is_moving(now):
-            return False
+            return ''
         q = joints.mean_positions()
-        is_free = is_place_free(q, required, scene)
-        return not is_free and is_place_free(q, replace(required, ray_guard_length=0.0), scene)
+        if not is_place_free(q, changed(required, ray_guard_length=0.0), scene):
+            return ''
+        return box_in_ray(q, required, scene) or box_in_ray(
+            q, required, self._inputs.expected_scene()
+        )
 
     def _publish(
         self,

@@ -16,7 +16,8 @@ from rrth_planner.execution.expected_wearer import is_expected_free
 from rrth_planner.execution.handover import Handover, LEADS
 from rrth_planner.execution.remaining_motion import is_place_free
 from rrth_planner.execution.tracked_motion import OFF_COMMAND
-from rrth_planner.model.arm import reach_to
+from rrth_planner.model.arm import ArmModel, reach_to
+from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import RequestError
 from rrth_planner.model.frozen import changed
 from rrth_planner.model.scene import Scene
@@ -121,8 +122,8 @@ class Revalidation:
             if not aside <= FOLLOWS:
                 raise ArmHasMoved(
                     ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
-                    f'the arm is {aside:.4f} rad from what it was commanded within the last '
-                    f'{delay:g} s (controller_delay), expected at most {FOLLOWS:g} rad',
+                    f'the arm is {aside:.4f} rad (or m) from what it was commanded within the '
+                    f'last {delay:g} s (controller_delay), expected at most {FOLLOWS:g}',
                 )
             return
         else:
@@ -131,20 +132,20 @@ class Revalidation:
                 handover.running, present.joints.taken, arm, delay
             ).state.positions
             place = present.joints.positions
-        moved = float(np.abs(place - expected).max())
+        moved, joint, unit = _farthest(arm, place - expected)
         # A motion that starts further from the arm would begin with a jump.
         if not moved <= tolerance:
             raise ArmHasMoved(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
-                f'the arm {what} {moved:.4f} rad while its motion was planned, expected at most '
-                f'{tolerance:g} rad (start_tolerance)',
+                f'the arm {what} {moved:.4f} {unit} ({joint}) while its motion was planned, '
+                f'expected at most {tolerance:g} {unit} (start_tolerance)',
             )
-        aside = float(np.abs(present.q_start - self._motion.positions[0]).max())
+        aside, joint, unit = _farthest(arm, present.q_start - self._motion.positions[0])
         if handover is None and not aside <= OFF_COMMAND:
             raise ArmHasMoved(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
-                f'the arm rests {aside:.4f} rad from what it is commanded, expected at most '
-                f'{OFF_COMMAND:g} rad',
+                f'{joint} rests {aside:.4f} {unit} from what it is commanded, expected at most '
+                f'{OFF_COMMAND:g} {unit}',
             )
 
     def _require_clear(self, present: InputSnapshot) -> None:
@@ -200,3 +201,9 @@ class Revalidation:
     def _target_distance(self) -> float:
         target = self.snapshot.goal.target
         return reach_to(self.parameters.required.arm, target, self._motion.positions[-1])
+
+
+def _farthest(arm: ArmModel, gaps: Array) -> tuple[float, str, str]:
+    """Return the greatest of the joints' gaps, (dof,), whose it is, and its unit."""
+    k = int(np.abs(gaps).argmax())
+    return abs(float(gaps[k])), arm.joint_names[k], arm.units[k]

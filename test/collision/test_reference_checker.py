@@ -26,7 +26,7 @@ COORDINATES = st.tuples(*[st.floats(-1.0, 1.0)] * 3)
 QUATERNIONS = st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(
     a=COORDINATES,
     b=COORDINATES,

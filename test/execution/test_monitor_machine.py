@@ -244,6 +244,4 @@ class Monitor(RuleBasedStateMachine):
 
 
 TestMonitor = Monitor.TestCase
-TestMonitor.settings = settings(
-    max_examples=100, stateful_step_count=40, deadline=None, derandomize=True
-)
+TestMonitor.settings = settings(max_examples=100, stateful_step_count=40, derandomize=True)

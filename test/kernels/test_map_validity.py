@@ -39,7 +39,7 @@ def check(kernel, q_from, q_to, resolution, lower, upper):
 
 
 @pytest.mark.parametrize('dof', DOFS)
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(SEEDS)
 def test_an_edge_is_free_where_no_point_of_it_is_inside(dof, seed):
     rng = np.random.default_rng(seed)
@@ -70,7 +70,7 @@ def test_each_axis_alone_can_keep_an_edge_out_of_a_box(dof):
 
 
 @pytest.mark.parametrize('dof', DOFS)
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(SEEDS, st.floats(0.05, 3.0))
 def test_a_sampled_edge_is_free_where_none_of_its_points_is_inside(dof, seed, resolution):
     rng = np.random.default_rng(seed)
@@ -85,7 +85,7 @@ def test_a_sampled_edge_is_free_where_none_of_its_points_is_inside(dof, seed, re
 
 
 @pytest.mark.parametrize('dof', DOFS)
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(SEEDS)
 def test_the_free_radius_is_the_distance_from_the_nearest_box(dof, seed):
     rng = np.random.default_rng(seed)

@@ -12,7 +12,7 @@ pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 
 from benchmarks.common.flood import Flood  # noqa: E402
-from conftest import send, spinning, wait_until  # noqa: E402
+from conftest import ask, send, spinning, wait_until  # noqa: E402
 from geometry_msgs.msg import PointStamped  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
@@ -71,14 +71,13 @@ def _inputs(client, planner):
         wait_until(client.plan.service_is_ready, 120.0)
         for name, (_, make) in TOPICS.items():
             send(client, client.publishers_of[name], make())
-        ask(client, planner)
+        request(client, planner)
 
 
-def ask(client, planner):
+def request(client, planner):
     """Request a plan, which succeeds."""
-    future = client.plan.call_async(Trigger.Request())
-    wait_until(future.done)
-    assert future.result().success, future.result().message
+    answer = ask(client.plan)
+    assert answer.success, answer.message
     planner.check()
 
 
@@ -93,6 +92,6 @@ def test_requests_are_answered_while_a_topic_is_flooded(
         wait_until(lambda: flood.count > N_MESSAGES)
         begin = flood.count
         for _ in range(N_REQUESTS):
-            ask(client, planner)
+            request(client, planner)
             flood.check()
         assert flood.count > begin

@@ -143,7 +143,7 @@ def test_a_wearer_who_moves_into_the_way_stops_the_arm_and_it_goes_round(
 
 
 def test_a_hand_that_is_lost_in_the_way_of_a_motion_is_not_driven_into(
-    scene_of_a_motion, wait_until
+    scene_of_a_motion, wait_until, ask
 ):
     client, _ = scene_of_a_motion()
     n, hand = len(client.states), in_the_way(client, 1.6)
@@ -165,9 +165,8 @@ def test_a_hand_that_is_lost_in_the_way_of_a_motion_is_not_driven_into(
     # Once it is seen again, or deleted, the arm goes on.
     client.body.publish(samples.array(samples.command(Marker.DELETE, 'hand')))
     wait_until(lambda: not client.figures.get('lost parts'))
-    future = client.plan.call_async(Trigger.Request())
-    wait_until(future.done)
-    assert future.result().success, future.result().message
+    answer = ask(client.plan)
+    assert answer.success, answer.message
 
 
 def off_other(q):
@@ -175,17 +174,16 @@ def off_other(q):
     return pointing_error(worlds.table_1_arm(), np.array(q), np.array(OTHER))
 
 
-def test_a_new_target_is_planned_for_while_the_arm_stops(scene_of_a_motion, wait_until, send):
+def test_a_new_target_is_planned_for_while_the_arm_stops(scene_of_a_motion, wait_until, send, ask):
     client, said = scene_of_a_motion()
     n, box = len(client.states), in_the_way(client, 1.6)
     msg, scene = body(box)
     send(client, client.target, samples.target(*OTHER))
     client.body.publish(msg)
     wait_until(lambda: len(client.motions) >= 2)
-    future = client.plan.call_async(Trigger.Request())
-    wait_until(future.done)
     # For the new target, whether the arm was at rest or in motion to the old one.
-    assert future.result().success, future.result().message
+    answer = ask(client.plan)
+    assert answer.success, answer.message
     assert off_other(client.motion().positions[-1]) < 1e-6
     # On a busy machine after another stop, and then perhaps in another posture.
     wait_until(lambda: client.speed() == 0.0 and off_other(client.states[-1].position) < 1e-6)

@@ -91,7 +91,7 @@ def test_a_motion_that_begins_elsewhere_is_not_published(start, tmp_path):
     stranger.script.plans = plan_from_elsewhere
     message = stranger.answer().message
     assert message.startswith('FAILURE')
-    assert 'begins 0.0100 rad from the start that was asked for' in message
+    assert 'begins 0.0100 rad (or m) from the start that was asked for' in message
     assert not stranger.received['joint_trajectory']
     assert stranger.answer().success
 

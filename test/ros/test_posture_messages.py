@@ -3,7 +3,7 @@
 """What trackers publish is a posture, with its stamp and frame, or is rejected in a sentence."""
 
 from human_urdf import human_urdf
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 
@@ -90,7 +90,6 @@ def test_markers_that_are_no_person_are_rejected(array, person, words):
         posture_from_markers(array, NAMES, person)
 
 
-@settings(deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), lost=st.sets(st.integers(0, 2)))
 def test_poses_come_back_as_they_were_written_lost_ones_too(seed, lost):
     rng = np.random.default_rng(seed)

@@ -115,7 +115,7 @@ def streams(draw):
     return order
 
 
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=500)
 @given(order=streams())
 def test_the_newest_edit_of_each_publisher_stays_whatever_their_clocks_say(order):
     copies, markers, body = Copies(takes_late=True), MarkerOrder(), WearerBody()

@@ -124,7 +124,7 @@ WIRES = {
     'target': ('/fire/target', PointStamped),
     'joints': ('/fire/joint_states', JointState),
 }
-MANY = settings(max_examples=300, deadline=None)
+MANY = settings(max_examples=300)
 
 
 def is_a_sentence(text):
@@ -393,7 +393,7 @@ def test_bytes_that_are_no_message_are_rejected(wire, name, data, header):
     wire.say(name, header + data)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(body=ARRAYS, aim=TARGETS, state=STATES)
 def test_every_request_is_answered_and_the_next_good_one_succeeds(wire, body, aim, state):
     wire.check()
@@ -403,7 +403,7 @@ def test_every_request_is_answered_and_the_next_good_one_succeeds(wire, body, ai
     wire.check()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     q=st.lists(st.one_of(st.floats(-0.3, 0.3), NUMBERS), min_size=4, max_size=4),
     v=st.lists(st.one_of(st.floats(-1.6, 1.6), NUMBERS), min_size=4, max_size=4),
@@ -415,7 +415,7 @@ def test_any_moving_arm_gets_a_handover_or_a_rejection(wire, q, v):
     wire.plan()
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     start=st.builds(PoseStamped, header=HEADERS, pose=POSES),
     goal=st.builds(PoseStamped, header=HEADERS, pose=POSES),
@@ -438,7 +438,7 @@ def reporter_of(wire):
     return wire.planner._reporter
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     name=st.sampled_from(['algorithm', 'margin', 'seed', 'max_velocity', 'time_limit', 'nothing']),
     value=st.one_of(NUMBERS, st.integers(-(2**63), 2**63 - 1), TEXTS, ROWS, st.booleans()),
@@ -555,7 +555,7 @@ def test_whatever_comes_over_the_wire_the_nodes_live_on(spinning, send, wait_unt
         assert is_a_sentence(future.result().message)
         return future.result()
 
-    @settings(max_examples=25, deadline=None, phases=[Phase.generate])
+    @settings(max_examples=25, phases=[Phase.generate])
     @given(st.data())
     def fire(data):
         for publisher, messages, _ in publishers.values():

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A point that jumps stays where it was for one posture; what moves is passed on at once."""
 
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 import numpy as np
 from rrth_planner.wearer.jump_filter import without_jumps
 from rrth_planner.wearer.posture import Posture
@@ -105,7 +105,6 @@ def walk(steps, outliers):
 small = st.tuples(*[st.floats(-0.08, 0.08)] * 3)
 
 
-@settings(deadline=None)
 @given(st.lists(small, min_size=2, max_size=30), st.data())
 def test_what_is_passed_on_is_never_far_from_the_truth(steps, data):
     # Outliers one by one, and never the first one, which nothing contradicts.

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Links are where one joint after another takes them; what is no tree is rejected."""
 
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.model.errors import ModelError
@@ -51,7 +51,6 @@ def pose_of(tree, name, q):
     return pose_of(tree, link.parent, q) @ link.origin @ moved
 
 
-@settings(deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), n=st.integers(1, 12))
 def test_links_are_where_one_joint_after_another_takes_them(seed, n):
     rng = np.random.default_rng(seed)
@@ -64,7 +63,6 @@ def test_links_are_where_one_joint_after_another_takes_them(seed, n):
         np.testing.assert_allclose(places[k], expected[:3, 3], atol=1e-11)
 
 
-@settings(deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_what_is_beyond_an_unknown_joint_is_unknown_and_nothing_else(seed):
     rng = np.random.default_rng(seed)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A recording has a posture at any time, and neither jumps nor finds what was lost."""
 
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.model.errors import RecordError
@@ -57,7 +57,6 @@ def test_at_the_time_of_a_frame_the_posture_is_that_frame():
         assert posture.names == person.names
 
 
-@settings(deadline=None)
 @given(st.integers(0, 2**31), st.integers(0, 5), st.floats(0.0, 1.0), st.sampled_from([0.5, 3.1]))
 def test_between_two_frames_it_is_interpolated(seed, k, part, turn):
     person = person_of(seed, turn=turn)
@@ -79,7 +78,6 @@ def test_half_a_turn_apart_the_nearer_rotation_is_taken():
     np.testing.assert_allclose(posture_at(person, 0.6).rotations, turns[1], atol=1e-12)
 
 
-@settings(deadline=None)
 @given(st.integers(0, 2**31), st.floats(0.0, 50.0), st.floats(1e-4, 0.05))
 def test_played_forwards_and_backwards_nothing_jumps(seed, time, step):
     person = person_of(seed)

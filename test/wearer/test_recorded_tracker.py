@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A simulated tracker measures what was recorded, with the faults that are asked for."""
 
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.model.errors import OptionsError
@@ -54,7 +54,6 @@ def test_noise_has_the_given_deviation_in_each_coordinate():
     assert np.abs(correlation).max() < 0.1
 
 
-@settings(deadline=None)
 @given(
     st.sampled_from([1.0, 24.0, 30.0, 60.0, 120.0]),
     st.sampled_from([0.0, 0.1, 1 / 3, 2.0]),

@@ -176,6 +176,14 @@ class Reporter:
         self._node.get_logger().warning(f'goal of answer {self._request} given up: {why}')
         self._publish()
 
+    def ray_blocked_by(self, box: str) -> None:
+        """Publish what an arm at rest waits for to leave its pointing ray; empty: nothing."""
+        if self._separation.state is SeparationState.FAULT:
+            return
+        cause = f'the arm waits until {box} is out of its pointing ray'
+        waits = SeparationStatus(SeparationState.PROTECTIVE_STOP, cause, 0.0, 'pointing ray', box)
+        self.separation_status(waits if box else SeparationStatus())
+
     def nothing_runs(self) -> None:
         """Publish that no motion is executed, and none will be without a request."""
         is_fault = self._separation.state is SeparationState.FAULT

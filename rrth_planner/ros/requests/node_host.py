@@ -19,7 +19,7 @@ from rrth_planner.collision.violation import Violation
 from rrth_planner.execution.coroutines import Coroutines, Wait
 from rrth_planner.model.errors import one_line, RequestError
 from rrth_planner.model.status import ErrorCode
-from rrth_planner.pipeline.host import random_seed
+from rrth_planner.pipeline.host import LONGEST_ANSWER, random_seed
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.planning_process import (
     LONGEST_WARM_UP,
@@ -31,9 +31,7 @@ from rrth_planner.ros.middleware.backlog import process_backlog
 from rrth_planner.ros.middleware.work_thread import WorkThread
 
 T = TypeVar('T')
-# A planner that hangs is given up so long after its time limit, or after any other question [s].
-LONGEST_ANSWER = 5.0
-# Nor does a request wait longer for a file to be written [s].
+# A request waits no longer for a file to be written [s].
 LONGEST_HELP = 5.0
 # Reading what has come pauses after so long, so that the node's timers run; it is given up after
 # so long in all [s].
