@@ -96,7 +96,7 @@ def test_a_dead_planner_leaves_requests_unanswered_in_time():
     found = course_of('dead_planner')
     told = [one for one in found.pursuits if 'has not answered' in one.sentence]
     assert told
-    assert all(one.took > 9.0 for one in told)
+    assert all(one.took > 8.99 for one in told)
 
 
 def test_nothing_begins_while_a_hand_is_lost_and_what_moves_then_stops():
@@ -226,11 +226,14 @@ def test_the_page_says_the_values_that_a_scenario_does_not_give(tmp_path):
 def test_the_command_prints_what_became_of_each_target_and_draws_it(tmp_path, capsys):
     pytest.importorskip('matplotlib')
     picture = tmp_path / 'course.png'
-    given = ['intercepting_hand', '--seconds', '9', '--seed', '6', '--plot', str(picture)]
+    given = ['intercepting_hand', '--seconds', '16', '--seed', '6', '--plot', str(picture)]
     assert main(given) == 0
     text = capsys.readouterr().out
-    assert rehearsed(scenario_of('intercepting_hand', seconds=9.0, seed=6)).digest in text
-    assert 'aimed' in text
+    found = rehearsed(scenario_of('intercepting_hand', seconds=16.0, seed=6))
+    assert found.digest in text
+    outcomes = [one.outcome for one in found.pursuits if one.outcome]
+    assert outcomes
+    assert all(text.count(outcome) >= outcomes.count(outcome) for outcome in outcomes)
     assert picture.stat().st_size > 10_000
 
 
