@@ -2,9 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """A stop that is found at once is a motion like any other, and as soon as the proven one."""
 
+from dataclasses import replace
+
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
+from rrth_planner.execution.command import led, rest_at
+from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.kernels.trajectory.fast_stop import first_rest, first_window
 from rrth_planner.kernels.trajectory.lookahead import look_ahead, MOST, S, TIME, time_after
 from rrth_planner.kernels.trajectory.stop_search import keeps_limits, line_stop, stop_s
@@ -12,6 +16,7 @@ from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import (
     MotionLimits,
     piece_coefficients,
+    positions_at,
     sample,
     Trajectory,
 )
@@ -234,3 +239,21 @@ def test_what_a_kernel_finds_within_limits_is_so_by_plain_numpy(seed):
         worst = max(worst, float((values / most).max()))
     # Between the instants that are looked at it may be a little more.
     assert worst < 1.01 if holds else worst > 0.999
+
+
+@examples(60)
+@given(seed=SEEDS, since=st.floats(0.0, 0.02), is_sharp=st.booleans())
+def test_a_stop_that_comes_late_to_a_motion_that_has_just_begun_is_on_it(seed, since, is_sharp):
+    motion = planned_motion(np.random.default_rng(seed))
+    # The message rests, moves, and stops so long after its begin.
+    lead = 0.0275
+    planned = ExecutingMotion(trajectory=motion, start_time=1.0)
+    whole = led(rest_at(motion, lead), planned).trajectory
+    sharp = replace(LIMITS, acceleration=np.full(4, 10.0), jerk=np.full(4, 400.0))
+    bounds = sharp if is_sharp else LIMITS
+    stop = fast_stop(whole, since, bounds, lead)
+    assert stop.duration < lead + 0.1
+    # By a cycle of a controller at 200 Hz.
+    late = lead + 0.005
+    gap = positions_at(whole, [since + late]) - positions_at(stop, [min(late, stop.duration)])
+    assert np.abs(gap).max() < 3e-6 + bounds.jerk.max() * 0.005**3 / 6.0

@@ -29,8 +29,8 @@ FIRST_WINDOW, WINDOW_GROWTH, LONGEST_CELL, MOST_CELLS = 3.0, 4.0, 0.01, 256
 # be at a limit when the stop begins; less where the points of the stop exceed the limits.
 RESERVES = (1.003, 0.985, 0.95, 0.85)
 # A motion that rests so shortly before a stop may begin ends there: within this time it would have
-# moved on by 7e-6 rad at 40 rad/s^3 [s].
-AT_REST = 0.01
+# moved on by 1e-7 rad at 40 rad/s^3, and by 3e-6 rad where the message comes a cycle late [s].
+AT_REST = 2.5e-3
 
 
 @kernel(int64(CUBE, VEC, float64, int64, OUT_VEC, OUT_CUBE), is_inner=True)
