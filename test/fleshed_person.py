@@ -167,24 +167,35 @@ def hand(person, rng, side, along, angle):
     down = np.cross(X, along)
     down *= -np.sign(down[2])
     curls = angle(0, 90), angle(0, 100)
-    for across in (-0.033, -0.011, 0.011, 0.033):
+    fingers = {'pinky': -0.033, 'ring': -0.011, 'middle': 0.011, 'index': 0.033}
+    for finger_name, across in fingers.items():
         root = palm * along + across * X
-        at, pointing, total = root, along, 0.0
+        at, pointing, total, bends = root, along, 0.0, [root]
         for curl in curls:
             total += np.radians(curl)
             pointing = np.cos(total) * along + np.sin(total) * down
             tip = at + (0.5 * finger - 0.005) * pointing
             ends = person.at(name, at), person.at(name, tip)
             round_cone(person, rng, name, ends, (0.01, 0.01))
+            bends.append(tip)
             at = tip
+        knuckles(person, side, finger_name, [*bends[:2], 0.5 * (bends[1] + at), at])
     thumb = 0.03 * along + 0.025 * X
     tip = thumb + 0.062 * (0.7 * along + 0.7 * X)
     ends = person.at(name, thumb), person.at(name, tip)
     round_cone(person, rng, name, ends, (0.013, 0.012))
+    share = np.linspace(0.0, 1.0, 4)[:, None]
+    knuckles(person, side, 'thumb', thumb + share * (tip - thumb))
     # What trackers call the hand, and the knuckles of the index and the little finger.
     add_frame(person.frames, f'{side} palm', name, 0.8 * palm * along, np.eye(3))
     add_frame(person.frames, f'{side} index', name, palm * along + 0.033 * X, np.eye(3))
     add_frame(person.frames, f'{side} pinky', name, 0.95 * palm * along - 0.033 * X, np.eye(3))
+
+
+def knuckles(person, side, finger, places):
+    """Add the four points that trackers report of a finger, from its root to its tip."""
+    for k, place in enumerate(places, 1):
+        add_frame(person.frames, f'{side} {finger} {k}', f'{side} hand', place, np.eye(3))
 
 
 def leg(person, rng, side, sign, angle):
@@ -280,6 +291,10 @@ def zed_body(n):
             for frame in ('index', 'pinky'):
                 place = person.at(f'{side.lower()} {frame}')
                 seen[f'{side}_HAND_{frame.upper()}_1'] = place, None
+            for finger in ('thumb', 'index', 'middle', 'ring', 'pinky') if n == 70 else ():
+                for k in range(1, 5):
+                    place = person.at(f'{side.lower()} {finger} {k}')
+                    seen[f'{side}_HAND_{finger.upper()}_{k}'] = place, None
             toes = seen.pop(f'{side}_FOOT')
             seen |= {f'{side}_BIG_TOE': toes, f'{side}_SMALL_TOE': toes}
             del seen[f'{side}_HAND']

@@ -18,9 +18,10 @@ import sys
 import time
 
 from rrth_planner.rehearsal.contacts import AT_REST, FAST, SLOW
+from rrth_planner.rehearsal.ray_time import CLASSES
 from tqdm import tqdm
 
-from benchmarks.people.beside import LENGTH, Row, row_of, scenarios, STOPS
+from benchmarks.people.beside import HANDS, LENGTH, RATES, Row, row_of, scenarios, STOPS
 
 # Causes of lost time that are printed.
 MOST_CAUSES = 12
@@ -28,20 +29,22 @@ MOST_CAUSES = 12
 PERIOD = 240.0
 
 HEADER = (
-    '| recording | rate | time [s] | aimed within 6 s | plans | stops | ray across a part, in '
-    'motion, of 240 s [s] | contacts faster than v_c: part kept its speed | part was faster | '
-    'slower | at rest | times real time, a core |'
+    '| recording | rate | hands [m] | time [s] | goals taken | aims within 6 s, goals not taken | '
+    'all | plans | stops | ray across a part, in motion, of 240 s [s] | contacts faster than v_c: '
+    'part kept its bound | it did not | slower | at rest | times real time, a core |'
 )
 
 
 def line_of(row: Row) -> str:
     """Return a line of the table."""
     contacts = row.contacts
-    share = 100.0 * row.n_aimed / max(row.n_requests, 1)
+    n_free, n_aimed = row.n_requests - row.n_taken, row.n_aimed - row.n_aimed_taken
     cells = (
-        *(row.name, f'{row.rate:g}', f'{row.seconds:.0f}'),
-        f'{row.n_aimed} of {row.n_requests} ({share:.0f} %)',
-        *(row.n_plans, row.n_stops, f'{row.ray * PERIOD / row.seconds:.2f}'),
+        *(row.name, f'{row.rate:g}', f'{row.hands:g}' if row.hands else 'default'),
+        *(f'{row.seconds:.0f}', f'{row.n_taken} ({_percent(row.n_taken, row.n_requests)})'),
+        f'{n_aimed} of {n_free} ({_percent(n_aimed, n_free)})',
+        f'{row.n_aimed} of {row.n_requests} ({_percent(row.n_aimed, row.n_requests)})',
+        *(row.n_plans, row.n_stops, f'{_of_period(sum(row.ray.values()), row):.2f}'),
         *(contacts[FAST, True], contacts[FAST, False]),
         contacts[SLOW, True] + contacts[SLOW, False],
         contacts[AT_REST, True] + contacts[AT_REST, False],
@@ -50,26 +53,55 @@ def line_of(row: Row) -> str:
     return f'| {" | ".join(map(str, cells))} |'
 
 
+def ray_lines(wholes: Sequence[Row]) -> list[str]:
+    """Return the table of the time of the ray, by how it began."""
+    header = f'| rate | hands [m] | {" | ".join(CLASSES)} | all |'
+    lines = [header, f'|{" --- |" * (header.count("|") - 1)}']
+    for row in wholes:
+        seconds = [*(row.ray.get(word, 0.0) for word in CLASSES), sum(row.ray.values())]
+        cells = ' | '.join(f'{_of_period(value, row):.2f}' for value in seconds)
+        lines.append(f'| {row.rate:g} | {row.hands:g} | {cells} |')
+    return lines
+
+
+def _percent(n: int, of: int) -> str:
+    return f'{100.0 * n / max(of, 1):.1f} %'
+
+
+def _of_period(seconds: float, row: Row) -> float:
+    return seconds * PERIOD / row.seconds
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure, print tables, and return 1 where a contact was too fast."""
     options = _parser().parse_args(arguments)
     recordings = (
         [str(path) for path in sorted(options.folder.glob('*.bvh'))] if options.folder else []
     )
-    items = scenarios(recordings, options.hours, options.seconds, options.stop, options.seed)
+    n = options.seeds
+    if options.hours is not None:
+        each = 3600.0 * options.hours / options.seconds
+        n = math.ceil(each / (len(RATES) * len(options.hands) * (1 + len(recordings))))
+    items = scenarios(recordings, n, options.seconds, options.stop, options.seed, options.hands)
     begin = time.monotonic()
-    rows: dict[tuple[str, float], Row] = {}
+    rows: dict[tuple[str, float, float], Row] = {}
     # Compiled code is kept, and loaded by each.
     with get_context('spawn').Pool(options.jobs) as pool:
         found = pool.imap(row_of, items)
         for row in tqdm(found, total=len(items), file=sys.stderr, disable=None):
-            rows.setdefault((row.name, row.rate), Row(row.name, row.rate)).add(row)
-    whole = Row('all', math.nan)
+            key = row.name, row.rate, row.hands
+            rows.setdefault(key, Row(*key)).add(row)
+    whole = Row('all', math.nan, math.nan)
+    wholes = {(r, h): Row('all', r, h) for r in RATES for h in options.hands}
+    print(f'Stops {options.stop}, seeds {options.seed} on\n')
     print(f'{HEADER}\n|{" --- |" * (HEADER.count("|") - 1)}')
     for row in rows.values():
         whole.add(row)
+        wholes[row.rate, row.hands].add(row)
         print(line_of(row))
-    print(line_of(whole).replace('| nan |', '| – |'))
+    print(*map(line_of, wholes.values()), sep='\n')
+    print('\nRay across a part, arm in motion, of 240 s [s], by how it began:\n')
+    print(*ray_lines(tuple(wholes.values())), sep='\n')
     print('\nWhat became of targets: ', end='')
     print(', '.join(f'{n} {what}' for what, n in whole.outcomes.most_common()))
     print('\n| time lost [s] | share [%] | the arm | for |\n| --- | --- | --- | --- |')
@@ -93,7 +125,15 @@ def _parser() -> argparse.ArgumentParser:
     )
     add = parser.add_argument
     add('folder', type=Path, nargs='?', metavar='FOLDER', help='with recordings (BVH)')
-    add('--hours', type=float, default=0.5, help='in virtual time [h] (%(default)s)')
+    add('--seeds', type=int, default=1, help='runs beside each, rate and hands (%(default)s)')
+    add('--hours', type=float, help='in virtual time, as many runs as that takes [h]')
+    add(
+        '--hands',
+        type=float,
+        nargs='+',
+        default=HANDS,
+        help='edges of their boxes, 0: as the skeleton has them (%(default)s) [m]',
+    )
     add('--seconds', type=float, default=LENGTH, help='of each run [s] (%(default)s)')
     add('--stop', choices=STOPS, default='4/40', help='stop limits (%(default)s)')
     add('--seed', type=int, default=0, help='of the first run (%(default)s)')

@@ -59,6 +59,13 @@ def add_size(parser: argparse.ArgumentParser) -> None:
         help='of the person, or of the smallest and the largest one [m] (1.4 2.0)',
     )
     parser.add_argument(
+        '--hand-size',
+        type=number('m'),
+        default=0.0,
+        metavar='M',
+        help='edge of the boxes of hands without finger points [m] (as in the skeleton)',
+    )
+    parser.add_argument(
         '--unit',
         metavar='UNIT',
         help='of its lengths: m, cm, mm, inch, foot, or how long it is [m] (what it says, or an '

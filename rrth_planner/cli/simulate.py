@@ -212,6 +212,7 @@ def _simulation_words(options: argparse.Namespace) -> list[str]:
         'wearer_file': f"'{options.file or ''}'",
         'skeleton': options.skeleton,
         'stature': [float(stature) for stature in options.stature],
+        'hand_size': float(options.hand_size),
         'wearer_unit': f"'{options.unit or ''}'",
         'lag': options.lag,
         'payload': options.payload,

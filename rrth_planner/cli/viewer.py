@@ -80,7 +80,7 @@ def _run_planning(options: argparse.Namespace) -> None:
         if options.body:
             raise OptionsError('--person: given with --body, expected one of them')
         person = load_person(options.person or None, unit=options.unit, say=partial(say, 'viewer'))
-        skeleton = load_skeleton(options.skeleton, options.stature)
+        skeleton = load_skeleton(options.skeleton, options.stature, options.hand_size)
         scene, _ = body_boxes(skeleton, posture_at(person, 0.0))
     q_start = start_of(arm)
     question = question_of(arm, scene, q_start, target, settings, max(0, settings.seed))

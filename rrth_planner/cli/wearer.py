@@ -49,7 +49,7 @@ def _publish(options: argparse.Namespace, given: Sequence[str]) -> None:
     )
     person = load_person(options.file, unit=options.unit, say=lambda words: say('wearer', words))
     person = excerpt(person, options.begin, options.end)
-    skeleton = load_skeleton(options.skeleton, options.stature)
+    skeleton = load_skeleton(options.skeleton, options.stature, options.hand_size)
     if options.form == 'boxes' or driver:
         # A skeleton of another tracker is named at once.
         try:

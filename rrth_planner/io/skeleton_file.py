@@ -13,6 +13,7 @@ from rrth_planner.io.resources import resource_path
 from rrth_planner.io.text_file import load_yaml, naming_file
 from rrth_planner.model.arrays import Array, float_array, frozen_array
 from rrth_planner.model.errors import SceneError, shown
+from rrth_planner.wearer.hands import with_hand_size
 from rrth_planner.wearer.skeleton import (
     AXES,
     BASE,
@@ -44,7 +45,9 @@ BLOCK = ('around', *(side for pair in SIDES for side in pair))
 BONE = ('ends', 'share')
 
 
-def load_skeleton(name_or_path: str | Path, stature: Sequence[float] = STATURES) -> Skeleton:
+def load_skeleton(
+    name_or_path: str | Path, stature: Sequence[float] = STATURES, hand_size: float = 0.0
+) -> Skeleton:
     """
     Return a skeleton of `config/skeletons` by its name, or of a file whose name ends in `.yaml`.
 
@@ -52,12 +55,15 @@ def load_skeleton(name_or_path: str | Path, stature: Sequence[float] = STATURES)
     ----------
     stature : sequence of 1 or 2 floats
         Of the wearer, or of the smallest and of the largest one [m]; by default of any adult.
+    hand_size : float
+        Edge of the boxes of hands whose fingers the tracker does not see [m]; 0: as in the file.
 
     Raises
     ------
     ModelError, SceneError
         There is no such skeleton, the file cannot be read, or it describes none; a stature
-        outside 0.5 to 2.8, none or more than two.
+        outside 0.5 to 2.8, none or more than two; a hand_size other than 0 or 0.05 to 1, or
+        one for hands with fingers.
 
     """
     is_file = str(name_or_path).endswith('.yaml')
@@ -73,7 +79,7 @@ def load_skeleton(name_or_path: str | Path, stature: Sequence[float] = STATURES)
     given = float_array(stature, (None,), 'stature', 'm', SceneError)
     if len(given) not in (1, 2):
         raise SceneError(f'stature: {len(given)} values, expected one or two [m]')
-    return replace(skeleton, stature=given[[0, -1]])
+    return with_hand_size(replace(skeleton, stature=given[[0, -1]]), hand_size)
 
 
 def skeleton_from_mapping(

@@ -215,6 +215,7 @@ def goal_rejection(world: World, goals: GoalSet) -> Rejection:
     least: dict[tuple[str, str], float] = {}
     reaches = np.maximum(goals.blocked_reaches, world.ray_length)
     n_colliding: Counter[tuple[str, str]] = Counter()
+    in_way: Counter[str] = Counter()
     for q, reach, depths in zip(
         goals.q_blocked, reaches, box_depths(world, goals.q_blocked, reaches), strict=True
     ):
@@ -227,6 +228,7 @@ def goal_rejection(world: World, goals: GoalSet) -> Rejection:
             pair = (world.bar_names[bar], world.box_names[box])
             found[pair] = max(found.get(pair, 0.0), float(depths[bar, box]))
         pairs.update(found.keys())
+        in_way.update({box for _, box in found})
         for pair, depth in found.items():
             least[pair] = min(least.get(pair, np.inf), depth)
     blame = 'with next to no clearance'
@@ -237,8 +239,14 @@ def goal_rejection(world: World, goals: GoalSet) -> Rejection:
     elif pairs:
         (bar, box), count = pairs.most_common(1)[0]
         share = 100.0 * count / len(goals.q_blocked)
+        # Of many only some were looked at.
+        some = (
+            '' if len(goals.q_blocked) == goals.n_aiming else f' {len(goals.q_blocked)} looked at'
+        )
+        is_all = in_way[box] == len(goals.q_blocked)
         blame = (
-            f'most often {bar} and box "{box}" ({share:.0f} %), penetration depth '
+            (f'box "{box}" takes all{some}, ' if is_all else '')
+            + f'most often {bar} and box "{box}" ({share:.0f} %), penetration depth '
             f'at least {least[bar, box]:.4f} m including the margin'
         )
     return Rejection(

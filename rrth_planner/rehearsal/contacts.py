@@ -6,6 +6,7 @@ Contacts of the arm with the wearer as he really is, instant by instant, in plai
 It uses the kinematics of the reference checker, and nothing of the proof.
 """
 
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +21,7 @@ from rrth_planner.collision.reference_checker import (
 from rrth_planner.kernels.layout import ROTATION, SIZE
 from rrth_planner.model.arm import ArmModel, bars_of, is_called
 from rrth_planner.model.arrays import Array
+from rrth_planner.wearer.hands import hand_distances
 
 # A part of a bar is looked at in so many places, and once more in so many round the nearest one.
 PLACES, ROUNDS = 33, 2
@@ -58,13 +60,15 @@ def distances_to(
     rows: Array,
     contact_speed: float,
     within: float,
+    hands: Collection[str] = (),
 ) -> Distances:
     """
     Return how far the arm was from boxes that move.
 
     q, v (n, dof): states [rad, rad/s]; rows (n, m, 15): the boxes then; within: what is further
-    away is not measured [m]. The flesh round a place of the axis of a bar is taken to be as fast
-    as the place and its radius times the sum of the speeds of the joints that turn the bar.
+    away is not measured [m]; hands: which boxes are those of `wearer.hands.round_wrists`, of which
+    only what may be flesh counts. The flesh round a place of the axis of a bar is taken to be as
+    fast as the place and its radius times the sum of the speeds of the joints that turn the bar.
     """
     bars, n, m = bars_of(arm)[:-1], len(q), rows.shape[1]
     ends, velocities = moving_bars(arm, q, v)
@@ -79,15 +83,16 @@ def distances_to(
         for k, name in enumerate(names):
             if any(part == bar.name and is_called(name, box) for part, box in arm.allowed):
                 continue
-            gaps = box_distances(middle[:, None], rows[:, k])[:, 0] - half - bar.radius
+            gaps_of = hand_distances if name in hands else box_distances
+            gaps = gaps_of(middle[:, None], rows[:, k])[:, 0] - half - bar.radius
             near = np.flatnonzero(gaps <= within)
             if not len(near):
                 continue
-            whole[near, b, k] = _least(ends[near, b], everything[near], rows[near, k])[0]
+            whole[near, b, k] = _least(ends[near, b], everything[near], rows[near, k], gaps_of)[0]
             whole[near, b, k] -= bar.radius
             for part in (0, 1):
                 some = near[parts[near, part, 0] <= parts[near, part, 1]]
-                least, at = _least(ends[some, b], parts[some, part], rows[some, k])
+                least, at = _least(ends[some, b], parts[some, part], rows[some, k], gaps_of)
                 least -= bar.radius
                 moved = velocities[some, b]
                 pace = np.linalg.norm(
@@ -121,7 +126,9 @@ def box_distances(points: Array, rows: Array) -> Array:
     return result
 
 
-def _least(ends: Array, part: Array, rows: Array) -> tuple[Array, Array]:
+def _least(
+    ends: Array, part: Array, rows: Array, gaps_of: Callable[[Array, Array], Array]
+) -> tuple[Array, Array]:
     """Return the least distance of a part of each line from its box [m], and where that is."""
     index, u = np.arange(len(ends)), np.linspace(0.0, 1.0, PLACES)
     begin, end = part[:, 0], part[:, 1]
@@ -129,7 +136,7 @@ def _least(ends: Array, part: Array, rows: Array) -> tuple[Array, Array]:
     for _ in range(ROUNDS):
         s = begin[:, None] + (end - begin)[:, None] * u
         points = ends[:, None, 0] + s[..., None] * (ends[:, None, 1] - ends[:, None, 0])
-        found = box_distances(points, rows)
+        found = gaps_of(points, rows)
         best = found.argmin(axis=1)
         place = np.where(found[index, best] < least, s[index, best], place)
         least = np.minimum(least, found[index, best])

@@ -38,6 +38,7 @@ from rrth_planner.rehearsal.virtual_host import VirtualHost
 from rrth_planner.rehearsal.witness import Testimony, Witness
 from rrth_planner.rehearsal.world import BEGIN, Wire, World
 from rrth_planner.simulation.trajectory_controller import ControllerRules, ControllerVersion
+from rrth_planner.wearer.hands import hands_of, has_fingers, round_wrists, with_hand_size
 
 # Where the arm begins [rad].
 FOLDED = (0.0, -0.35, 0.5 * np.pi, 0.5 * np.pi)
@@ -132,7 +133,7 @@ def rehearsed(
         lag=execution.lag,
         flight=flight,
     )
-    witness = Witness(world, person, is_drawn)
+    witness = Witness(world, person, is_drawn, _flesh(scenario))
     if isinstance(person, InterceptingWearer):
         hand = person
 
@@ -192,16 +193,37 @@ def is_within(time: float, spans: tuple[Pair, ...]) -> bool:
 def _person(scenario: Scenario) -> RecordedWearer | InterceptingWearer:
     recorded, hand = scenario.recorded, scenario.intercepting
     if recorded is not None:
-        file = str(scenario.folder / recorded.file) if recorded.file else ''
-        return _recorded(file, recorded.skeleton, recorded.rate, recorded.begin)
+        return recorded_wearer(scenario)
     assert hand is not None
     return InterceptingWearer(
         *(load_body(), hand.hand, hand.home, hand.speed, hand.waits, hand.pursues)
     )
 
 
+def recorded_wearer(scenario: Scenario) -> RecordedWearer:
+    """Return the recorded person of a scenario that has one, with the boxes of his tracker."""
+    recorded = scenario.recorded
+    assert recorded is not None
+    file = str(scenario.folder / recorded.file) if recorded.file else ''
+    return _recorded(*(file, recorded.skeleton, recorded.rate, recorded.begin, recorded.hand_size))
+
+
+def _flesh(scenario: Scenario) -> RecordedWearer | None:
+    """Return a recorded person with hands that bend any way; None: who has no such hands."""
+    recorded = scenario.recorded
+    if recorded is None or any(map(has_fingers, hands_of(load_skeleton(recorded.skeleton)))):
+        return None
+    file = str(scenario.folder / recorded.file) if recorded.file else ''
+    found = _recorded(file, recorded.skeleton, recorded.rate, recorded.begin, None)
+    return found if found.names == recorded_wearer(scenario).names else None
+
+
 # Several scenarios beside the same person make boxes of him once.
-@lru_cache(maxsize=4)
-def _recorded(file: str, skeleton: str, rate: float, begin: float) -> RecordedWearer:
-    person = load_person(Path(file) if file else None)
-    return RecordedWearer(person, load_skeleton(skeleton), rate, begin)
+@lru_cache(maxsize=8)
+def _recorded(
+    file: str, skeleton: str, rate: float, begin: float, hand_size: float | None
+) -> RecordedWearer:
+    """Return a recorded person; without a size of hands: hands that bend any way."""
+    person, boxes = load_person(Path(file) if file else None), load_skeleton(skeleton)
+    hands = round_wrists(boxes) if hand_size is None else with_hand_size(boxes, hand_size)
+    return RecordedWearer(person, hands, rate, begin)

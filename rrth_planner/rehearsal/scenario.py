@@ -50,6 +50,8 @@ class Recorded:
         How fast he is played, of 1.
     begin : float
         What comes before is not played [s].
+    hand_size : float
+        Edge of the boxes of his hands [m]; 0: as the skeleton has them.
 
     """
 
@@ -57,6 +59,7 @@ class Recorded:
     skeleton: str = 'cmu_bvh'
     rate: float = 1.0
     begin: float = 0.0
+    hand_size: float = 0.0
 
     def __post_init__(self) -> None:
         """Validate."""

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from rrth_planner.collision.reference_checker import bar_box_contact, bar_radii, bars
 from rrth_planner.execution.decision import Command
 from rrth_planner.kernels.layout import ROTATION, SIZE
@@ -18,8 +19,10 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.separation import speed_bound
 from rrth_planner.rehearsal.contacts import AT_REST, classes_of, distances_to, FAST, SLOW
+from rrth_planner.rehearsal.ray_time import seconds_by_class
 from rrth_planner.rehearsal.world import BEGIN, Wearer, World
 from rrth_planner.simulation.trajectory_controller import ControllerState
+from rrth_planner.wearer.hands import HANDS
 
 # Instants that are judged at once, and those that wait for the wearer to have come so far.
 CHUNK, HELD_BACK = 1000, 20
@@ -45,8 +48,8 @@ class Testimony:
         wearer was seen whom the motion was proven with.
     sentences : list of str
         On contacts of the class FAST.
-    ray_seconds : float
-        How long the pointing ray of an arm in motion crossed a part [s].
+    ray : dict
+        How long the pointing ray of an arm in motion crossed a part, by how that began [s].
     moving_seconds : float
         How long the arm was in motion [s].
     nearest : list of (float, float)
@@ -56,9 +59,14 @@ class Testimony:
 
     contacts: Counter[tuple[str, bool]] = field(default_factory=Counter)
     sentences: list[str] = field(default_factory=list)
-    ray_seconds: float = 0.0
+    ray: dict[str, float] = field(default_factory=dict)
     moving_seconds: float = 0.0
     nearest: list[tuple[float, float]] = field(default_factory=list)
+
+    @property
+    def ray_seconds(self) -> float:
+        """How long the pointing ray of an arm in motion crossed a part [s]."""
+        return sum(self.ray.values())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,13 +106,24 @@ class Witness:
         As he is; what a tracker sees of him is with the world.
     is_drawn : bool
         Whether to measure how far the nearest part is, too.
+    flesh : Wearer, optional
+        What the arm meets of him, in the same order, where that is not his boxes: hands as
+        `wearer.hands.round_wrists` has them.
 
     """
 
-    def __init__(self, world: World, truth: Wearer, is_drawn: bool = False) -> None:
+    def __init__(
+        self, world: World, truth: Wearer, is_drawn: bool = False, flesh: Wearer | None = None
+    ) -> None:
         """Begin with nothing seen."""
         self.testimony = Testimony()
         self._world, self._truth, self._is_drawn = world, truth, is_drawn
+        self._flesh = flesh
+        self._hands = () if flesh is None else tuple(n for n in flesh.names if n in HANDS)
+        # Of the ray at some instants: whether the arm moved, a part was crossed, and whether it
+        # would have been had the wearer stood still since the one before; and the boxes then.
+        self._rays: list[NDArray[np.bool_]] = []
+        self._rows_before: Array | None = None
         separation = world.rules.execution.separation
         self._contact_speed = 0.1 if separation is None else separation.rules.contact_speed
         self._rules = None if separation is None else separation.rules
@@ -121,6 +140,10 @@ class Witness:
         self._judge(len(self._seen))
         for key in tuple(self._open):
             self._end(key)
+        if self._rays:
+            period = SPARSE * self._world.arm.controller.period / 2
+            is_moving, is_crossed, went_in = np.concatenate(self._rays, axis=1)
+            self.testimony.ray = seconds_by_class(is_moving, is_crossed, went_in, period)
         return self.testimony
 
     def _note(self, command: Command) -> None:
@@ -146,8 +169,11 @@ class Witness:
         # Between two cycles the arm moves along the line, and is judged in the middle, too.
         times, q, v = (_with_middles(np.array([one[k] for one in seen])) for k in range(3))
         rows = np.nan_to_num(np.array([self._truth.rows_at(time) for time in times]), nan=1e3)
-        speed = self._contact_speed
-        distances = distances_to(arm, q, v, names, rows, speed, WITHIN)
+        speed, flesh = self._contact_speed, rows
+        if self._flesh is not None:
+            at_times = np.array([self._flesh.rows_at(time) for time in times])
+            flesh = np.nan_to_num(at_times, nan=1e3)
+        distances = distances_to(arm, q, v, names, flesh, speed, WITHIN, self._hands)
         classes = classes_of(distances)
         for i, bar, box in np.argwhere(classes != ''):
             word, speed_there = str(classes[i, bar, box]), float(distances.speeds[i, bar, box])
@@ -159,22 +185,32 @@ class Witness:
             if contact.last < self._n_judged - 1:
                 self._end(key)
         period = self._world.arm.controller.period / 2
-        is_moving = (np.abs(v) > MOVING).any(axis=1)
+        is_moving = np.asarray((np.abs(v) > MOVING).any(axis=1))
         found.moving_seconds += float(is_moving.sum()) * period
-        some = np.flatnonzero(is_moving)[::SPARSE]
-        if len(some):
-            length = self._world.rules.required.ray_guard_length
-            ray = bars(arm, q[some], length)[:, -1]
-            half = 0.5 * rows[some][:, :, SIZE:ROTATION] + bar_radii(arm)[-1]
-            turns = rows[some][:, :, ROTATION:].reshape(len(some), -1, 3, 3)
-            centers = rows[some][:, :, :SIZE]
-            crossed = bar_box_contact(ray[:, None], centers[:, :, None], turns, half).any(axis=1)
-            found.ray_seconds += float(crossed.sum()) * SPARSE * period
+        few = slice(None, None, SPARSE)
+        self._look_along(q[few], rows[few], is_moving[few])
         if self._is_drawn:
-            few = slice(None, None, SPARSE)
-            near = distances_to(arm, q[few], v[few], names, rows[few], speed, IN_PICTURES)
+            near = distances_to(
+                arm, q[few], v[few], names, flesh[few], speed, IN_PICTURES, self._hands
+            )
             gaps = np.minimum(near.whole.min(axis=(1, 2)), IN_PICTURES)
             found.nearest += zip(times[few].tolist(), gaps.tolist(), strict=True)
+
+    def _look_along(self, q: Array, rows: Array, is_moving: NDArray[np.bool_]) -> None:
+        """Take note of what the ray crosses at some instants, (n, dof), (n, m, 15)."""
+        arm, length = self._world.rules.required.arm, self._world.rules.required.ray_guard_length
+        before = rows[:1] if self._rows_before is None else self._rows_before
+        ray, radius = bars(arm, q, length)[:, -1], bar_radii(arm)[-1]
+        self._rays.append(
+            np.array(
+                [
+                    is_moving,
+                    _crosses(ray, radius, rows),
+                    _crosses(ray, radius, np.concatenate([before, rows[:-1]])),
+                ]
+            )
+        )
+        self._rows_before = rows[-1:]
 
     def _meet(
         self,
@@ -220,6 +256,14 @@ class Witness:
     def _end(self, key: tuple[int, int]) -> None:
         contact = self._open.pop(key)
         self.testimony.contacts[contact.word, contact.is_kept] += 1
+
+
+def _crosses(ray: Array, radius: float, rows: Array) -> NDArray[np.bool_]:
+    """Return whether rays (n, 2, 3) meet one of the boxes (n, m, 15) each, (n,)."""
+    half = 0.5 * rows[:, :, SIZE:ROTATION] + radius
+    turns = rows[:, :, ROTATION:].reshape(*rows.shape[:2], 3, 3)
+    meets = bar_box_contact(ray[:, None], rows[:, :, None, :SIZE], turns, half)
+    return np.asarray(meets.any(axis=1))
 
 
 def _with_middles(values: Array) -> Array:

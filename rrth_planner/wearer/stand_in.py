@@ -27,6 +27,12 @@ CHEST = (-0.03, 0.0, 0.05)
 # forward, left and up where the arms hang; left is outwards for the left arm [m].
 PLATE_ON_CHEST, PLATE_ON_ARM, PLATE_ON_HAND = (-0.1, 0.0, 0.0), 0.05, (0.0, 0.0, -0.05)
 
+# A recording has no fingers: those of a stretched hand, their knuckles from the wrist along the
+# hand and to the thumb, and how far their four points are along them from there [m].
+FINGERS = {'index': 0.033, 'middle': 0.011, 'ring': -0.011, 'pinky': -0.033}
+KNUCKLES, ALONG_FINGER = 0.105, (0.0, 0.045, 0.065, 0.085)
+THUMB, ALONG_THUMB = (0.03, 0.025), (0.0, 0.015, 0.03, 0.045)
+
 
 def stand_in(
     recorded: Skeleton, first: Posture, tracker: Skeleton, view: str
@@ -73,12 +79,32 @@ def _points(recorded: Skeleton, posture: Posture, tracker: Skeleton) -> Seen:
     joints = _joints_by_name(recorded, posture)
     T = base_pose(recorded, posture)
     joints['chest'] = T[:3, :3] @ np.array(CHEST) + T[:3, 3]
+    joints |= _fingers(joints, T[:3, :3])
     positions = {name: np.full(3, np.nan) for name in tracker.names_by_id}
     # A point that is a joint by itself is there, whichever mean it belongs to.
     for joint in sorted(tracker.joints, key=lambda joint: -len(joint.points)):
         for point in joint.points:
             positions[point] = joints.get(joint.name, np.full(3, np.nan))
     return positions, {}
+
+
+def _fingers(joints: dict[str, Array], base: Array) -> dict[str, Array]:
+    """Return the points of the fingers of stretched hands, thumbs to the front."""
+    found: dict[str, Array] = {}
+    for side in ('left', 'right'):
+        lost = np.full(3, np.nan)
+        wrist, hand = (joints.get(f'{side} {name}', lost) for name in ('wrist', 'hand'))
+        if np.isnan(wrist + hand).any():
+            continue
+        palm = _hanging(wrist - hand, base[:, 0])
+        along, across = -palm[:, 2], palm[:, 0]
+        for finger, beside in FINGERS.items():
+            for k, way in enumerate(ALONG_FINGER, 1):
+                found[f'{side} {finger} {k}'] = wrist + (KNUCKLES + way) * along + beside * across
+        for k, way in enumerate(ALONG_THUMB, 1):
+            place = (THUMB[0] + way) * along + (THUMB[1] + way) * across
+            found[f'{side} thumb {k}'] = wrist + place
+    return found
 
 
 def _joints_by_name(skeleton: Skeleton, posture: Posture) -> dict[str, Array]:

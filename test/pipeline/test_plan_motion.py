@@ -176,9 +176,42 @@ def test_a_share_of_configurations_is_at_most_all_of_them():
     (share,) = re.findall(r'\((\d+) %\)', rejection.sentence)
     assert share == '100'
     # The bound of the proof, not a distance that may be greater; of both bars the deeper.
+    assert 'box "everywhere" takes all, most often link 3 and' in rejection.sentence
+    # Of more than are kept it says how many were looked at.
+    some = goal_rejection(world, replace(goals, n_aiming=900))
+    assert 'box "everywhere" takes all 40 looked at, most often' in some.sentence
     depths = box_depths(world, q, np.full(40, 2.0)).max(axis=1)
     (deep,) = re.findall(r'penetration depth at least (\d\.\d+) m', rejection.sentence)
     assert float(deep) == pytest.approx(depths.min(), abs=1e-4)
+
+
+def test_a_part_is_said_to_take_all_postures_whichever_bars_meet_it_only_where_it_does():
+    rng, arm = np.random.default_rng(4), table_1_arm()
+    q = rng.uniform(*arm.bounds, (400, 4))
+    reaches = np.full(400, 1.0)
+
+    def sentence(*boxes):
+        world = arm_world(arm, Scene(boxes), MARGIN, RAY)
+        met = box_depths(world, q, reaches) > 0.0
+        is_met = met.any(axis=(1, 2))
+        goals = GoalSet(
+            q_goals=q[:0],
+            n_bent=0,
+            n_aiming=int(is_met.sum()),
+            q_blocked=q[is_met],
+            blocked_reaches=reaches[is_met],
+        )
+        return goal_rejection(world, goals).sentence, met[is_met]
+
+    one = Box('hand', [0.3, 0.0, 0.3], [0.8, 0.8, 0.8], np.eye(3))
+    said, met = sentence(one)
+    # Bars meet it here and there, none of them always.
+    assert met.any(axis=2).mean(axis=0).max() < 1.0
+    assert 'box "hand" takes all, most often' in said
+    said, met = sentence(one, Box('head', [-0.6, 0.0, 0.9], [0.3, 0.3, 0.3], np.eye(3)))
+    assert met.any(axis=1).mean(axis=0).max() < 1.0
+    assert 'takes all' not in said
+    assert 'most often' in said
 
 
 def test_a_target_that_every_ray_must_cross_the_wearer_for_is_rejected_with_bar_and_box():

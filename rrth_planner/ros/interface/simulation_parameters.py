@@ -20,6 +20,7 @@ from rrth_planner.ros.interface.playback_parameters import (
     initial_positions,
     of_each_joint,
 )
+from rrth_planner.ros.interface.tracker_parameters import HAND_SIZE
 from rrth_planner.ros.middleware.parameter_declaration import ARM, declare, reject_unknown, Setting
 from rrth_planner.simulation.mechanics import Mechanics
 from rrth_planner.simulation.moving_body import MovingBody, recorded_body, scene_at, standing_body
@@ -87,6 +88,7 @@ SETTINGS = (
     ),
     _fixed('skeleton', 'cmu_bvh', 'name or path', 'what makes boxes of a recording'),
     _fixed('stature', list(STATURES), 'm', 'of the smallest and the largest one', 0.5, 2.8),
+    HAND_SIZE,
     _fixed(
         'wearer_unit',
         '',
@@ -145,7 +147,7 @@ def simulated_wearer(node: Node) -> SimulatedWearer | None:
         value['wearer_begin'],
         value['wearer_end'] or None,
     )
-    skeleton = load_skeleton(value['skeleton'], value['stature'])
+    skeleton = load_skeleton(value['skeleton'], value['stature'], value['hand_size'])
     return SimulatedWearer(recorded_body(person, skeleton), person, skeleton)
 
 

@@ -11,6 +11,7 @@ from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import OptionsError, shown
 from rrth_planner.ros.messages.wearer_choice import NEAREST, ONLY
 from rrth_planner.ros.middleware.parameter_declaration import declare, reject_unknown, Setting
+from rrth_planner.wearer.hands import LARGEST
 from rrth_planner.wearer.skeleton import Skeleton, STATURES
 
 # What a tracker publishes, and which of these have numbers in place of names.
@@ -25,6 +26,14 @@ NAME = '{name}'
 
 # None changes while the node runs.
 _fixed = partial(Setting, is_read_only=True)
+HAND_SIZE = _fixed(
+    'hand_size',
+    0.0,
+    'm',
+    'edge of the boxes of hands without finger points; 0: as in the skeleton',
+    0.0,
+    LARGEST,
+)
 SETTINGS = (
     _fixed('skeleton', 'azure_kinect', 'name or path', 'of config/skeletons, or a .yaml file'),
     _fixed('input', 'markers', ' or '.join(INPUTS), 'what the tracker publishes'),
@@ -55,6 +64,7 @@ SETTINGS = (
     _fixed('base_frame', 'torso', 'frame id', 'frame of the boxes'),
     _fixed('lifetime', 0.2, 's', 'a part that is not seen for so long is lost', 0.001, 60.0),
     _fixed('stature', list(STATURES), 'm', 'of the smallest and the largest wearer', 0.5, 2.8),
+    HAND_SIZE,
     _fixed('max_jump', 0.3, 'm', 'a point that moves further is held back', 0.01, 100.0),
 )
 
@@ -95,7 +105,7 @@ def declare_tracker_parameters(node: Node) -> TrackerParameters:
         raise OptionsError('base_frame: empty, expected the name of the frame of the boxes')
     if NAME not in values['pose_topic']:
         raise OptionsError(f'pose_topic: "{values["pose_topic"]}", expected a name with {NAME}')
-    skeleton = load_skeleton(values['skeleton'], values.pop('stature'))
+    skeleton = load_skeleton(values['skeleton'], values.pop('stature'), values.pop('hand_size'))
     person = values['person']
     is_number = type(person) is int and ONLY <= person <= MOST_PERSON
     if not is_number and person != NEAREST:
