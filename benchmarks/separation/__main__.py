@@ -126,8 +126,8 @@ def print_people(options: argparse.Namespace, extent: Extent) -> None:
             print(people.line_of(record), flush=True)
             for sentence in record.sentences if record.is_separate else ():
                 print(f'{take.name}, {take.rate:g}: {sentence}', file=sys.stderr)
-    print('\nFrames since which a part was faster than assumed of it:\n')
-    print('\n'.join(people.speed_lines(records)))
+    print('\nFrames at which a part had got further than assumed since any of the last second:\n')
+    print('\n'.join(people.reach_lines(records)))
 
 
 def print_perception(options: argparse.Namespace, extent: Extent) -> None:

@@ -1,7 +1,7 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Section `adversary`: parts of the wearer that leave to intercept the arm, at their body speed.
+Section `adversary`: parts of the wearer that leave to intercept the arm, as fast as they may.
 
 What is seen, lost and wrong in between is the perception's, which section `perception` varies.
 """
@@ -19,9 +19,10 @@ from rrth_planner.io.wearer_file import load_body
 from rrth_planner.kernels.layout import SIZE
 from rrth_planner.model.arm import bars_of
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.body_reach import Lines
 from rrth_planner.model.rotation import rotation_matrix
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.separation import speed_bound
+from rrth_planner.model.separation import governing_reach, SeparationRules
 from rrth_planner.model.trajectory import positions_at, Trajectory
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.rehearsal.contacts import (
@@ -114,8 +115,11 @@ class Trial:
     ----------
     case : Case
     timing : Timing
-    speed : float
-        Of the part that leaves, over what is assumed of it [-].
+    scale : float
+        How far the part that leaves gets, over what is assumed of it [-].
+    is_steady : bool
+        Whether it goes on for ever at its greatest speed, which is assumed of it for an instant
+        only.
     is_separate : bool
         Whether motions are given as commitments; else they are monitored as a whole.
     faults : Faults
@@ -128,7 +132,8 @@ class Trial:
 
     case: Case = Case()
     timing: Timing = Timing()
-    speed: float = 1.0
+    scale: float = 1.0
+    is_steady: bool = False
     is_separate: bool = True
     faults: Faults = Faults()
     shares: tuple[float, float, float] = SHARES
@@ -137,7 +142,8 @@ class Trial:
     @property
     def is_honest(self) -> bool:
         """Whether all that is assumed is so: then nothing faster than v_c may be met."""
-        return self.is_separate and self.speed <= 1.0 and self.faults.understated == 0.0
+        is_within = self.scale <= 1.0 and not self.is_steady
+        return self.is_separate and is_within and self.faults.understated == 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,6 +166,9 @@ class Hand:
         The least distance of a fast place from any box [m].
     was_moving : bool
         Whether the arm moved when the part left.
+    is_noticed : bool
+        Whether the planner knew that the part was further than assumed before it met the arm, or,
+        where it did not, at all.
 
     """
 
@@ -171,6 +180,7 @@ class Hand:
     speed: float
     gap: float
     was_moving: bool
+    is_noticed: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,9 +213,8 @@ def chain_of_hands(trial: Trial, n: int, seed: int) -> Chain:
             # One that is in the way even at rest, of the ray say, would stop every arm.
             if not is_remaining_free(whole, 0.0, required(), scene):
                 continue
-        name = scene.boxes[part].name
-        speed = trial.speed * speed_bound(separation_of(trial.case).rules, name)
-        wearer = Reaching(scene, part, speed, is_turning)
+        lines = way_lines(trial, separation_of(trial.case).rules, scene.boxes[part].name)
+        wearer = Reaching(scene, part, lines, is_turning)
         episode = _Episode(trial, plan, q, wearer, rng)
         if not episode.run():
             n_blocked += 1
@@ -213,6 +222,14 @@ def chain_of_hands(trial: Trial, n: int, seed: int) -> Chain:
         hands.append(episode.judged(seed, len(hands)))
         q = episode.place()
     return Chain(tuple(hands), n_blocked)
+
+
+def way_lines(trial: Trial, rules: SeparationRules, name: str) -> Lines:
+    """Return lines the least of which says how far a part gets since it left."""
+    lines = governing_reach(rules, name)[1]
+    if trial.is_steady:
+        lines = tuple((c, w) for c, w in lines if c == 0.0)
+    return tuple((trial.scale * c, trial.scale * w) for c, w in lines)
 
 
 def _draw_part(
@@ -272,7 +289,7 @@ class _Episode:
         self.is_right_after = bool(rng.random() < RIGHT_AFTER)
         self.aim = str(rng.choice([EARLIEST, FASTEST]))
         self.aims_again, self.looks_at_plan = (bool(rng.random() < 0.5) for _ in range(2))
-        self.leaves, self.was_moving = np.inf, False
+        self.leaves, self.was_moving, self.noticed = np.inf, False, np.inf
         self.gone_from = np.inf
 
     def run(self) -> bool:
@@ -292,6 +309,8 @@ class _Episode:
             if self.rng.random() >= faults.lost or k == 1:
                 self._see(time)
                 planner.frame(time, self.eyes)
+                if planner.n_further and self.noticed == np.inf:
+                    self.noticed = time
         return False
 
     def _choose(self, time: float) -> None:
@@ -334,11 +353,10 @@ class _Episode:
         q, v = self._expected(at, ahead)
         direction = interception(
             self.settings.arm,
-            ahead,
             q,
             v,
             wearer.rows(np.array([at]))[0, wearer.part],
-            wearer.speed,
+            wearer.ways_ahead(at, ahead),
             self.settings.rules.contact_speed,
             self.aim,
         )
@@ -346,7 +364,7 @@ class _Episode:
             direction = self.rng.standard_normal(3)
             direction /= np.linalg.norm(direction)
         if direction is not None:
-            wearer.head_for(wearer.speed * direction, at)
+            wearer.head_for(direction, at)
 
     def _expected(self, time: float, ahead: Array) -> tuple[Array, Array]:
         """Return what the part expects of the arm: what it was given, or that it goes on."""
@@ -391,6 +409,8 @@ class _Episode:
             0.3,
         )
         classes = classes_of(found)
+        # When it first met a fast place of the arm.
+        met = times[(classes == FAST).any(axis=(1, 2))]
         return Hand(
             seed=seed,
             number=number,
@@ -400,6 +420,7 @@ class _Episode:
             speed=float(found.speeds[classes == FAST].max(initial=0.0)),
             gap=float(found.fast.min()),
             was_moving=self.was_moving,
+            is_noticed=bool(self.noticed < (met[0] if len(met) else np.inf)),
         )
 
     def place(self) -> Array:
@@ -421,8 +442,8 @@ def _path_state(planner: Planner, time: float) -> tuple[float, float, float] | N
 
 HEADER = (
     '| what | v_c [m/s] | stop | parts that left | arm in motion then | contacts, arm faster than '
-    'v_c | slower | at rest | faster within the margin | fastest contact [m/s] | least distance '
-    'of a fast place [mm] | motions that could not begin |'
+    'v_c | before the part was noticed | slower | at rest | faster within the margin | fastest '
+    'contact [m/s] | least distance of a fast place [mm] | motions that could not begin |'
 )
 
 
@@ -438,6 +459,7 @@ def line_of(what: str, trial: Trial, chains: Sequence[Chain]) -> str:
         len(hands),
         len(moving),
         f'{counts[FAST]} ({100.0 * counts[FAST] / n:.1f} %)',
+        sum(hand.word == FAST and not hand.is_noticed for hand in hands),
         counts[SLOW],
         counts[AT_REST],
         sum(hand.is_near for hand in hands),
@@ -453,13 +475,17 @@ def trials() -> dict[str, Trial]:
     strict = Case(contact_speed=0.0, stop='10/400')
     usual = Trial()
     return {
-        'at the speeds assumed': usual,
-        'at the speeds assumed, stop 10/400': replace(usual, case=Case(stop='10/400')),
-        'at the speeds assumed, strict': replace(usual, case=strict),
-        'power: 1.5 times as fast': replace(usual, speed=1.5),
-        'power: 1.5 times as fast, stop 10/400': replace(
-            usual, speed=1.5, case=Case(stop='10/400')
+        'as far as assumed': usual,
+        'as far as assumed, stop 10/400': replace(usual, case=Case(stop='10/400')),
+        'as far as assumed, strict': replace(usual, case=strict),
+        'for ever at the greatest speed': replace(usual, is_steady=True),
+        'for ever at the greatest speed, stop 10/400': replace(
+            usual, is_steady=True, case=Case(stop='10/400')
         ),
-        'power: 1.5 times as fast, strict': replace(usual, speed=1.5, case=strict),
+        'power: 1.5 times as far': replace(usual, scale=1.5),
+        'power: 1.5 times as far, stop 10/400': replace(
+            usual, scale=1.5, case=Case(stop='10/400')
+        ),
+        'power: 1.5 times as far, strict': replace(usual, scale=1.5, case=strict),
         'power: separation off, monitored': replace(usual, is_separate=False),
     }

@@ -244,6 +244,12 @@ class Planner:
         # An error of the monitor stops the arm for good, which would look like prudence.
         assert self.monitor.watch.n_faults == 0, self.monitor.watch.stop_reason
 
+    @property
+    def n_further(self) -> int:
+        """How often a part was seen further away than assumed."""
+        known = self.monitor.watch.commitments.body
+        return 0 if known is None else known.n_further
+
     def brake(self) -> None:
         """Stop the arm, since its motion is given up."""
         self.monitor.fail('the motion is given up', is_replanned=False, is_fault=False)

@@ -22,9 +22,10 @@ from rrth_planner.collision.reference_checker import bars
 from rrth_planner.io.wearer_file import load_body
 from rrth_planner.kernels.layout import SIZE
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.body_reach import Lines
 from rrth_planner.model.rotation import quaternion_xyzw
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.separation import speed_bound
+from rrth_planner.model.separation import governing_reach
 from rrth_planner.model.trajectory import sample, Trajectory
 from rrth_planner.rehearsal.contacts import (
     AT_REST,
@@ -86,12 +87,12 @@ AT_END = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """What is assumed, what happens to the planner, and how fast hands really are, of `v_k`."""
+    """What is assumed, what happens to the planner, and how far hands really get, of `D_k`."""
 
     what: str
     case: Case
     event: str = NOTHING
-    speed: float = 1.0
+    scale: float = 1.0
     is_separated: bool = True
     is_planner_in_real_time: bool = False
 
@@ -153,12 +154,12 @@ class Wearer:
         self._is_over.set()
         self._thread.join()
 
-    def add_hand(self, center: Array, speed: float) -> Reaching:
-        """Have a hand at rest, which may leave at a speed [m/s]."""
+    def add_hand(self, center: Array, lines: Lines) -> Reaching:
+        """Have a hand at rest, which may leave, and get as far as lines say."""
         self._n_hands += 1
         hand = Box(f'hand {self._n_hands}', center, np.full(3, SIDE), np.eye(3))
         scene = Scene((*self._body.boxes, hand))
-        self.reaching = Reaching(scene, len(scene.boxes) - 1, speed)
+        self.reaching = Reaching(scene, len(scene.boxes) - 1, lines)
         return self.reaching
 
     def remove_hand(self) -> None:
@@ -313,10 +314,11 @@ def _one_hand(
     found: Hands,
 ) -> None:
     """Have a hand reach for an arm in motion."""
-    speed = trial.speed * speed_bound(separation_of(trial.case).rules, 'hand')
+    assumed = governing_reach(separation_of(trial.case).rules, 'hand')[1]
+    lines = tuple((trial.scale * c, trial.scale * w) for c, w in assumed)
     fast = SET_OFF if trial.case.contact_speed > 0.0 else SET_OFF_STRICT
     client.hear(LONGEST, lambda: client.speed < REST)
-    wearer.add_hand(_place_near(np.array(client.states[-1][1]), rng), speed)
+    wearer.add_hand(_place_near(np.array(client.states[-1][1]), rng), lines)
     client.hear(0.3)
     for n_requests in itertools.count():
         client.publish_target(random_target(rng))
@@ -328,7 +330,7 @@ def _one_hand(
             # It may be the hand that is in the way.
             wearer.remove_hand()
             client.hear(0.1)
-            wearer.add_hand(_place_near(np.array(client.states[-1][1]), rng), speed)
+            wearer.add_hand(_place_near(np.array(client.states[-1][1]), rng), lines)
             client.hear(0.3)
             continue
         if client.hear(PATIENCE, lambda: client.speed > fast):
@@ -367,8 +369,8 @@ def _reach(client: Client, wearer: Wearer, trial: Trial, aim: str) -> None:
         q, v = client.ahead(times)
         now = client.get_clock().now().nanoseconds * 1e-9
         row = reaching.rows(np.array([now]))[0, reaching.part]
-        contact = trial.case.contact_speed
-        direction = interception(the_arm(), times, q, v, row, reaching.speed, contact, aim)
+        contact, ways = trial.case.contact_speed, reaching.ways_ahead(now, times)
+        direction = interception(the_arm(), q, v, row, ways, contact, aim)
         if direction is None:
             # It is there, and stays.
             with wearer.lock:
@@ -376,7 +378,7 @@ def _reach(client: Client, wearer: Wearer, trial: Trial, aim: str) -> None:
             client.hear(max(0.0, end - time.monotonic()))
             return
         with wearer.lock:
-            reaching.head_for(reaching.speed * direction, now)
+            reaching.head_for(direction, now)
         client.hear(AIM_PERIOD)
 
 
@@ -482,10 +484,10 @@ def trials() -> dict[str, tuple[Trial, bool]]:
     """Return the trials by name, and whether each ends planners."""
     found: list[tuple[Trial, bool]] = []
     for case in (Case(), Case(stop='10/400'), Case(contact_speed=0.0, stop='10/400')):
-        found.append((Trial('hands at the speed assumed', case), False))
+        found.append((Trial('hands as far as assumed', case), False))
     what = 'the same, planner in real time as well'
     found.append((Trial(what, Case(), is_planner_in_real_time=True), False))
-    found.append((Trial('power: 1.5 times as fast', Case(), speed=1.5), False))
+    found.append((Trial('power: 1.5 times as far', Case(), scale=1.5), False))
     found.append((Trial('power: separation off', Case(), is_separated=False), False))
     for event in (KILLED, STOPPED):
         for case in (Case(), Case(stop='10/400')):

@@ -6,7 +6,7 @@ Section `people`: the arm beside recorded people, asked for target after target 
 Between two recorded frames points of the person move straight: what is true at an instant is that.
 """
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
@@ -15,14 +15,14 @@ from pathlib import Path
 import sys
 
 import numpy as np
+from rrth_planner.collision.reference_checker import protrusions
 from rrth_planner.io.motion_capture_file import load_person
 from rrth_planner.io.skeleton_file import load_skeleton
-from rrth_planner.kernels.layout import ROTATION, SIZE
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import SceneError
 from rrth_planner.model.scene import Scene
-from rrth_planner.model.separation import speed_bound
+from rrth_planner.model.separation import reach_at, reach_of
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.rehearsal.contacts import AT_REST, classes_of, distances_to, FAST, SLOW
 from rrth_planner.wearer.body_boxes import body_boxes
@@ -59,6 +59,9 @@ T_POSE = 0.1
 CHUNK = 2.0
 # Of targets and latencies.
 SEED = 0
+# Frames are compared with those of so long before, to count parts that got further than assumed
+# [s].
+COMPARED = 1.0
 # How fast recordings are played, and what is assumed beside them.
 RATES = (1.0, 1.5)
 CASES = (Case(), Case(stop='10/400'))
@@ -143,11 +146,12 @@ class Beside:
         From asking to arriving, of the targets reached [s].
     n_plans : int
     contacts : Counter
-        By class, and whether the part had kept the speed assumed of it since it was seen.
+        By class, and whether the part had got no further than assumed since it was seen.
     sentences : list of str
         On contacts of the class FAST.
     n_steps, n_broken : Counter
-        Frames after another one, and of these the ones since which a part was too fast, by part.
+        Frames after another one, and of these the ones at which a part had got further than
+        assumed since any frame of the last second, by part.
 
     """
 
@@ -167,19 +171,6 @@ class Beside:
 REACHED, NOT_NOW, NO_PLAN = 'reached', 'not reachable now', 'no plan'
 
 
-def corners(row: Array) -> Array:
-    """Return the corners of a box, (8, 3) [m]."""
-    signs = np.indices((2, 2, 2)).reshape(3, 8).T * 2.0 - 1.0
-    rotation = row[ROTATION:].reshape(3, 3)
-    result: Array = row[:SIZE] + (0.5 * signs * row[SIZE:ROTATION]) @ rotation.T
-    return result
-
-
-def way_between(one: Array, other: Array) -> float:
-    """Return how far the corner of a box that went furthest is from where it was [m]."""
-    return float(np.linalg.norm(corners(one) - corners(other), axis=1).max())
-
-
 class Session:
     """An arm beside a recorded person, frame by frame."""
 
@@ -191,7 +182,7 @@ class Session:
         self.rng = np.random.default_rng(seed)
         self.settings = separation_of(record.case)
         self.names = parts_of(record.take)
-        self.speeds = np.array([speed_bound(self.settings.rules, n) for n in self.names])
+        self.reach = reach_of(self.names, self.settings.rules)
         self.controller = Controller(FOLDED)
         self.planner = Planner(
             self.settings, timing, self.rng, self.controller, is_separate=record.is_separate
@@ -206,27 +197,29 @@ class Session:
     def run(self, seconds: float) -> None:
         """Run for so long [s]."""
         n = round(seconds / self.timing.period)
-        before: Array | None = None
+        before: deque[Array] = deque(maxlen=round(COMPARED / self.timing.period))
         label = f'{self.record.take.name} {self.record.take.rate:g}'
         for k in tqdm(range(n), desc=label, file=sys.stderr, leave=False, disable=None):
             time = k * self.timing.period
             rows = self.record.take.rows(time - self.timing.age)
             seen = np.isfinite(rows).all(axis=1)
-            if before is not None:
-                self._count_steps(before, rows)
-            before = rows
+            if before:
+                self._count_steps(np.array(before), rows)
+            before.append(rows)
             self.eyes.see(rows, time - self.timing.age, seen)
             self._go_on(time)
         self.record.seconds = seconds
 
     def _count_steps(self, before: Array, rows: Array) -> None:
-        """Count the parts that were faster than assumed."""
-        error = 2.0 * self.settings.rules.body_error
+        """Count the parts that got further than assumed since any frame before, (n, m, 15)."""
+        elapsed = self.timing.period * np.arange(len(before), 0, -1.0)
+        bounds = reach_at(self.reach, np.repeat(elapsed[:, None], len(self.names), axis=1))
+        ways = protrusions(before, rows[None])
+        is_out = ways > bounds + 2.0 * self.settings.rules.body_error
         for k, name in enumerate(self.names):
-            way = way_between(before[k], rows[k])
-            if np.isfinite(way):
+            if np.isfinite(ways[-1, k]):
                 self.record.n_steps[name] += 1
-                self.record.n_broken[name] += way > self.speeds[k] * self.timing.period + error
+                self.record.n_broken[name] += bool(is_out[:, k].any())
 
     def _next(self, outcome: str, time: float) -> None:
         """Have no target any more."""
@@ -313,7 +306,7 @@ class Session:
                 if word == FAST and kept:
                     self.record.sentences.append(
                         f'{times[i]:.3f} s: bar {bar} at {distances.speeds[i, bar, box]:.2f} m/s '
-                        f'and box "{self.names[box]}", which kept its speed'
+                        f'and box "{self.names[box]}", which got no further than assumed'
                     )
         for instants_of in found.values():
             # Instants one after the other are one contact.
@@ -323,7 +316,7 @@ class Session:
                 self.record.contacts[word, any(kept for _, w, kept in some if w == word)] += 1
 
     def _kept(self, time: float, box: int, row: Array, numbers: dict[int, int]) -> bool:
-        """Return whether a part kept its speed since what the arm does then was proven."""
+        """Return whether a part got no further than assumed since what the arm does was proven."""
         controller = self.controller
         index = controller.index_at(time - self.timing.lag)
         number = numbers.get(id(controller.trajectories[index])) if index >= 0 else None
@@ -334,8 +327,9 @@ class Session:
             body = self.planner.bodies[number]
             taken = self.planner.commitments[number].start_time - float(body.ages[box])
             seen = body.scene.boxes[box].numbers
-        limit = self.speeds[box] * (time - taken) + self.settings.rules.body_error
-        return way_between(seen, row) <= limit
+        elapsed = np.full(len(self.names), max(time - taken, 0.0))
+        furthest = float(reach_at(self.reach, elapsed)[box]) + self.settings.rules.body_error
+        return bool(protrusions(seen, row) <= furthest)
 
 
 def beside_person(seconds: float, item: tuple[Take, Case, bool]) -> Beside:
@@ -350,7 +344,7 @@ def beside_person(seconds: float, item: tuple[Take, Case, bool]) -> Beside:
 HEADER = (
     '| recording | rate | separation | v_c [m/s] | stop | time [s] | targets reached | not '
     'reachable now | no plan | plans | median time of those reached [s] | time per target reached '
-    '[s] | contacts, arm faster than v_c: part kept its speed | part was faster | slower | at '
+    '[s] | contacts, arm faster than v_c: part as far as assumed | part further | slower | at '
     'rest |'
 )
 
@@ -390,8 +384,8 @@ def line_of(record: Beside) -> str:
     return f'| {" | ".join(map(str, cells))} |'
 
 
-def speed_lines(records: Sequence[Beside]) -> list[str]:
-    """Return the table of the frames since which a part was faster than assumed."""
+def reach_lines(records: Sequence[Beside]) -> list[str]:
+    """Return the table of the frames at which a part had got further than assumed."""
     names = list(dict.fromkeys(name for record in records for name in record.n_steps))
     lines = [f'| recording | rate | {" | ".join(names)} |']
     lines.append(f'|{" --- |" * (2 + len(names))}')

@@ -20,8 +20,18 @@ import sys
 from typing import Any
 from unittest import mock
 
+import numpy as np
 import rrth_planner
 from rrth_planner.cli import rrth
+from rrth_planner.model.body_reach import BODY_REACH, lines_shown
+from rrth_planner.model.separation import (
+    ANY_OTHER,
+    BODY_SPEEDS,
+    governing_reach,
+    reach_at,
+    reach_of,
+    SeparationRules,
+)
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
 from sphinx.errors import ExtensionError
@@ -31,6 +41,8 @@ ROOT = Path(__file__).resolve().parents[2]
 ARRAY = re.compile(
     r'~?(?:numpy\.)?ndarray\[tuple\[~?(?:typing\.)?Any, \.\.\.\], ~?(?:numpy\.)?dtype\[[~\w.]+\]\]'
 )
+# How far parts get is shown for these times [s].
+REACH_TIMES = np.array([0.05, 0.1, 0.2, 0.3, 0.5, 1.0])
 LINE = re.compile(
     r'^<!-- generated: (\w+) ?(\w*) -->$(\n(?:(?!<!-- ).*\n)*<!-- end -->$)?', re.MULTILINE
 )
@@ -249,6 +261,22 @@ def _documented(name: str) -> str:
     return '\n'.join([*lines, '   :members:'] if is_class else lines)
 
 
+def _reach() -> str:
+    """Return a table of how far the parts of a body get, by default."""
+    rules = SeparationRules()
+    said = {words: words for words, _ in BODY_REACH if words}
+    still = [words for words, speed in BODY_SPEEDS if speed == 0.0]
+    said |= {still[0]: ', '.join(still), 'some thing': ANY_OTHER}
+    rows = []
+    for name, words in said.items():
+        found = reach_at(reach_of((name,), rules), REACH_TIMES[:, None])[:, 0]
+        rows.append(
+            [words, lines_shown(governing_reach(rules, name)[1]), *map('{:.2f}'.format, found)]
+        )
+    times = [f'{time:g} s [m]' for time in REACH_TIMES]
+    return _table(['part', 'lines [m], t [s]', *times], rows)
+
+
 def _table(titles: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:
     """Return a table in Markdown; a bar within a cell would end it."""
     lines = [titles, ['---'] * len(tuple(titles)), *rows]
@@ -265,9 +293,13 @@ PARTS: dict[str, Callable[..., str]] = {
     'helps': _helps,
     'run': _run,
     'api': _api,
+    'reach': _reach,
 }
 
 
 if __name__ == '__main__':
-    for page in sorted((ROOT / 'docs' / 'reference').glob('*.md')):
-        page.write_text(written(page.read_text(encoding='utf-8')), encoding='utf-8')
+    for page in sorted((ROOT / 'docs').rglob('*.md')):
+        before = page.read_text(encoding='utf-8')
+        after = written(before)
+        if after != before:
+            page.write_text(after, encoding='utf-8')

@@ -265,17 +265,18 @@ def _sentences(client: DemoClient, separation: Separation, frame: str, error: fl
         status.state is SeparationState.PROTECTIVE_STOP is not before.state
         for (_, before), (_, status) in pairwise(client.statuses)
     )
-    n_targets, share = len(PERSON_TARGETS), 100.0 * found.n_faster / found.n_frames
+    n_targets, share = len(PERSON_TARGETS), 100.0 * found.n_further / found.n_frames
     return [
         f'Beside a person at work, with separation: {n_targets} of {n_targets} targets reached '
         f'(the ray misses them by at most {1e3 * error:.3f} mm) with {found.n_commitments} '
         f'commitments, protective stops: {n_stops}, least rate {_rates(client)[:, 1].min():.2f}. '
-        f'Parts of the body were faster than assumed in {share:.1f} % of {found.n_frames} frames.',
+        f'In {share:.1f} % of {found.n_frames} frames a part of the body had got further than '
+        'assumed.',
         'Each commitment ends at rest and is clear of wherever the person may be (exceptions: '
-        f'{found.n_excused} near parts faster than assumed, {found.n_unknown} where bodies are '
+        f'{found.n_excused} near parts that got further, {found.n_unknown} where bodies are '
         f'missing). At {found.n_instants} instants no part of the arm above '
         f'{rules.contact_speed:g} m/s was in contact with the person (exceptions: '
-        f'{found.n_contacts} with parts faster than assumed).',
+        f'{found.n_contacts} with parts that got further).',
     ]
 
 

@@ -90,7 +90,9 @@ def lines_of(found: 'Rehearsal') -> list[str]:
     lines += ['', 'contacts of the arm with the wearer as he really is:']
     for word in ('faster', 'slower', 'at rest'):
         kept, broken = seen.contacts[word, True], seen.contacts[word, False]
-        lines.append(f'  {word:8} {kept + broken:4}, {broken} with parts faster than assumed')
+        lines.append(
+            f'  {word:8} {kept + broken:4}, {broken} with parts that got further than assumed'
+        )
     lines += [f'  {sentence}' for sentence in seen.sentences]
     lines += [
         f'pointing ray across a part: {seen.ray_seconds:.2f} s of {seen.moving_seconds:.1f} s in '

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from rrth_planner.kernels.layout import ROTATION, SIZE
 from rrth_planner.model.arm import ArmModel, bar_ends, bars_of, Capsule, is_called, NO_BARS
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Box, Scene
@@ -29,6 +30,8 @@ LEFT, FAR, HALVINGS = 1e-3, 1.0, 40
 PLACES, ROUNDS = 33, 2
 # Bounds are made for so many instants together.
 STRETCH = 32
+# The corners of a box, in halves of its edges.
+_CORNERS = 0.5 * (np.indices((2, 2, 2)).reshape(3, 8).T * 2.0 - 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -403,6 +406,23 @@ def separation_violations(
         )
         for i, bar, k in np.argwhere(depths > ROUNDING)
     ]
+
+
+def protrusions(before: Array, after: Array) -> Array:
+    """
+    Return how far boxes get out of earlier ones, (..., 15) each -> (...) [m].
+
+    By how much the earlier one has to grow to contain the later one: the greatest distance of the
+    corners of this, since the distance from a box is convex.
+    """
+    later = after[..., ROTATION:].reshape(*after.shape[:-1], 3, 3)
+    edges = _CORNERS * after[..., None, SIZE:ROTATION]
+    corners = after[..., None, :SIZE] + np.einsum('...ij,...kj->...ki', later, edges)
+    earlier = before[..., ROTATION:].reshape(*before.shape[:-1], 3, 3)
+    local = np.einsum('...ji,...kj->...ki', earlier, corners - before[..., None, :SIZE])
+    beyond = np.maximum(np.abs(local) - 0.5 * before[..., None, SIZE:ROTATION], 0.0)
+    found: Array = np.sqrt((beyond * beyond).sum(axis=-1)).max(axis=-1)
+    return found
 
 
 def fast_distances(

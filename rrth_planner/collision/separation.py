@@ -14,8 +14,11 @@ from rrth_planner.kernels.collision.separation import first_blocked, permitted_r
 from rrth_planner.model.arm import ArmModel, bars_of
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.curves import curves_of
-from rrth_planner.model.separation import growth_at, SeenBody, Separation, SeparationRules
+from rrth_planner.model.separation import growth_lines, SeenBody, Separation, SeparationRules
 from rrth_planner.model.trajectory import Trajectory
+
+# A stop takes no longer than that, in the estimate of a rate [s].
+LONGEST_STOP = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,20 +42,21 @@ def first_unproven(
     Return where a motion is not proven separate from a moving wearer; None: it is proven.
 
     At no instant after `begin` [s] is a point of the arm that is faster than the contact speed in
-    a box that has been growing at its greatest speed since it was seen, margin [m] and error
-    added (`growth_at`). The body is that of the time 0 of the motion. The pointing ray is left
+    a box grown by how far it may have got since it was seen, margin [m] and error added
+    (`growth_at`). The body is that of the time 0 of the motion. The pointing ray is left
     out: it has no body. It holds between any two instants, too (`docs/algorithms.md`, section 8).
     """
     boxes = body.scene.boxes
     if not boxes or len(trajectory.times) == 1:
         return None
     found = np.empty(2)
+    lines = growth_lines(body, rules, margin + SLACK, trajectory.duration)
     blocking = first_blocked(
         jit.Points(trajectory.times, *trajectory.states),
         begin,
         rules.contact_speed,
         _arm_numbers(arm),
-        _body_numbers(arm, body, growth_at(body, rules, margin + SLACK, 0.0)),
+        _body_numbers(arm, body, *lines),
         BERNSTEIN_4,
         BERNSTEIN_3,
         found,
@@ -81,7 +85,8 @@ def permitted_ahead(
     rate would keep clear, too. An estimate: `first_unproven` proves.
     """
     arm, rules = settings.arm, settings.rules
-    found = np.empty((n_rates, 3))
+    found, until = np.empty((n_rates, 3)), settings.stretch + LONGEST_STOP
+    growths, speeds = growth_lines(body, rules, margin + SLACK, until)
     permitted_rates(
         curves_of(motion),
         motion.times,
@@ -92,7 +97,7 @@ def permitted_ahead(
         settings.stop_limits.rows,
         rules.contact_speed,
         _arm_numbers(arm),
-        _body_numbers(arm, body, growth_at(body, rules, margin + SLACK, settings.stretch)),
+        _body_numbers(arm, body, growths + speeds * settings.stretch, speeds),
         found,
     )
     return found
@@ -105,12 +110,12 @@ def _arm_numbers(arm: ArmModel) -> jit.Arm:
     return jit.Arm(jit.address(chain), robot, moving_joints(arm))
 
 
-def _body_numbers(arm: ArmModel, body: SeenBody, growths: Array) -> jit.Body:
-    """Return a wearer as the kernels take him; growths (m,): of the boxes [m]."""
-    growths.setflags(write=False)
+def _body_numbers(arm: ArmModel, body: SeenBody, growths: Array, speeds: Array) -> jit.Body:
+    """Return a wearer as the kernels take him; growths, speeds (m, n): lines of the boxes."""
+    for array in (growths, speeds):
+        array.setflags(write=False)
     scene = body.scene
-    allowed = allowed_bars(arm, scene)
-    return jit.Body(scene.numbers, allowed, mount_inverse(arm), growths, body.speeds)
+    return jit.Body(scene.numbers, allowed_bars(arm, scene), mount_inverse(arm), growths, speeds)
 
 
 @functools.lru_cache(maxsize=16)

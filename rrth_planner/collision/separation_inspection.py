@@ -2,34 +2,38 @@
 # SPDX-License-Identifier: Apache-2.0
 """An independent check of an arm beside a wearer who moves; shares nothing with the planner."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-import itertools
 
 import numpy as np
+from numpy.typing import NDArray
 from rrth_planner.collision.motion_inspection import REST, UnsafeMotionError
 from rrth_planner.collision.reference_checker import (
     fast_distances,
+    protrusions,
     separation_violations,
     SeparationViolation,
 )
+from rrth_planner.kernels.layout import ROTATION, SIZE
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.frozen import Frozen
-from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.separation import seen_body, SeparationRules, speed_bound
+from rrth_planner.model.scene import Scene
+from rrth_planner.model.separation import reach_at, reach_of, seen_body, SeparationRules
 from rrth_planner.model.trajectory import part_of, Trajectory
 
 # A commitment is judged at its points and so often [s].
 CHECK_PERIOD = 0.01
 # A planner may have known no newer body than one that is so old, where there are newer ones [s].
 OLDEST_BODY = 0.2
-# A part that was faster than assumed excuses what happens for so long [s].
+# A part that got further than assumed excuses what happens for so long [s].
 EXCUSED_TIME = 2.0
+# Bodies that are further apart are not compared to count them: few motions are given to a
+# controller for longer than that [s].
+COMPARED = 1.0
 # Bodies that come so many periods after each other: there may have been one between them that was
 # not received here.
 GAP_PERIODS = 1.5
-_CORNERS = 0.5 * np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,12 +60,13 @@ class SeparationInspection:
     ----------
     n_commitments, n_unknown, n_excused : int
         All of them; those near which a body may be missing here, so that nothing is known of them;
-        those that are near parts of the wearer that had been faster than assumed.
+        those that are near parts of the wearer that had got further than assumed.
     n_instants, n_contacts : int
         States of the arm, and those of them with a contact: only with parts of the wearer that had
-        been faster than assumed.
-    n_frames, n_faster : int
-        Bodies after another one, and those by which a part had been faster than assumed.
+        got further than assumed.
+    n_frames, n_further : int
+        Bodies after another one, and those by which a part had got further than assumed since any
+        body of the last second.
 
     """
 
@@ -71,7 +76,7 @@ class SeparationInspection:
     n_instants: int
     n_contacts: int
     n_frames: int
-    n_faster: int
+    n_further: int
 
 
 def inspect_separation(
@@ -101,7 +106,7 @@ def inspect_separation(
     UnsafeMotionError
         A commitment that does not end at rest, or violates the separation from the wearer as he
         was published until then; or a part of the arm faster than the contact speed in a box.
-        Not where the part of the wearer had been faster than assumed.
+        Not where the part of the wearer had got further than assumed.
 
     """
     n_unknown = n_excused = 0
@@ -113,7 +118,7 @@ def inspect_separation(
         if not found:
             continue
         boxes = {one.box for one in found}
-        if all(_was_faster(sights, name, published, rules) for name in boxes):
+        if all(_was_further(sights, name, published, rules) for name in boxes):
             n_excused += 1
         elif _has_gap(sights, published):
             n_unknown += 1
@@ -131,16 +136,12 @@ def inspect_separation(
         distances = fast_distances(arm, scene, q[rows], v[rows], rules.contact_speed, near)
         for i, bar, box in np.argwhere(distances <= 0.0):
             name, time = scene.boxes[box].name, float(times[rows[i]])
-            if not _was_faster(sights, name, time, rules):
+            if not _was_further(sights, name, time, rules):
                 raise UnsafeMotionError(
                     f'bar {bar} of the arm was faster than {rules.contact_speed:g} m/s in contact '
-                    f'with {name}, which was no faster than assumed'
+                    f'with {name}, which got no further than assumed'
                 )
         n_contacts += int((distances <= 0.0).any(axis=(1, 2)).sum())
-    n_faster = sum(
-        any(_is_faster(sights, box.name, range(k, k + 2), rules) for box in scene.boxes)
-        for k, scene in enumerate(sights.scenes[:-1])
-    )
     return SeparationInspection(
         n_commitments=len(commitments),
         n_unknown=n_unknown,
@@ -148,7 +149,7 @@ def inspect_separation(
         n_instants=int((newest >= 0).sum()),
         n_contacts=n_contacts,
         n_frames=len(sights.times) - 1,
-        n_faster=n_faster,
+        n_further=_further_frames(sights, rules),
     )
 
 
@@ -192,27 +193,47 @@ def _has_gap(sights: Sights, time: float) -> bool:
     return bool(np.diff([*sights.times[some], time]).max() > GAP_PERIODS * period)
 
 
-def _was_faster(sights: Sights, name: str, time: float, rules: SeparationRules) -> bool:
-    """Return whether a part had been faster than assumed shortly before a time [s]."""
-    return _is_faster(sights, name, sights.between(time - EXCUSED_TIME, time), rules)
+def _was_further(sights: Sights, name: str, time: float, rules: SeparationRules) -> bool:
+    """Return whether a part had got further than assumed shortly before a time [s]."""
+    some = sights.between(time - EXCUSED_TIME, time)
+    return any(is_out.any() for _, is_out in _compared(sights, name, some, rules, EXCUSED_TIME))
 
 
-def _is_faster(sights: Sights, name: str, some: range, rules: SeparationRules) -> bool:
-    """Return whether a part was faster between any two of some sights than assumed."""
+def _further_frames(sights: Sights, rules: SeparationRules) -> int:
+    """Return by how many bodies a part had got further than assumed."""
+    found, every = np.zeros(len(sights.times), np.bool_), range(len(sights.times))
+    for name in {name for scene in sights.scenes for name in scene.names}:
+        for later, is_out in _compared(sights, name, every, rules, COMPARED):
+            found[later[is_out]] = True
+    return int(found.sum())
+
+
+def _compared(
+    sights: Sights, name: str, some: range, rules: SeparationRules, longest: float
+) -> Iterator[tuple[NDArray[np.intp], NDArray[np.bool_]]]:
+    """
+    Yield which of some sights of a part are compared with which earlier ones, and which are out.
+
+    All that are up to `longest` apart [s]; a part is out where it got further than its reach and
+    two errors explain.
+    """
     known = [
-        (sights.times[k], _corners(box))
+        (k, sights.times[k], box.numbers)
         for k in some
         for box in sights.scenes[k].boxes
         if box.name == name
     ]
-    if len(known) < 2:
-        return False
-    times, corners = (np.array(column) for column in zip(*known, strict=True))
-    ways = np.linalg.norm(corners[:, None] - corners[None], axis=-1).max(axis=-1)
-    spans = np.abs(times[:, None] - times[None])
-    return bool((ways > speed_bound(rules, name) * spans + 2.0 * rules.body_error).any())
-
-
-def _corners(box: Box) -> Array:
-    corners: Array = box.center + (_CORNERS * box.size) @ box.rotation.T
-    return corners
+    if not known:
+        return
+    which, times, rows = (np.array(column) for column in zip(*known, strict=True))
+    reach = reach_of((name,), rules)
+    balls = 0.5 * np.linalg.norm(rows[:, SIZE:ROTATION], axis=1)
+    for step in range(1, len(which)):
+        spans = times[step:] - times[:-step]
+        if spans.min() > longest:
+            return
+        bounds = reach_at(reach, np.maximum(spans, 0.0)[:, None])[:, 0] + 2.0 * rules.body_error
+        ways = np.linalg.norm(rows[step:, :SIZE] - rows[:-step, :SIZE], axis=1)
+        # Nearer than that none of it can be out.
+        far = np.flatnonzero((ways + balls[step:] > bounds) & (spans <= longest))
+        yield which[step:][far], protrusions(rows[far], rows[far + step]) > bounds[far]

@@ -1,24 +1,24 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The wearer from one sight to the next: how old each part is, and whether it kept its speed."""
+"""The wearer from one sight to the next: how old each part is, and whether it kept its reach."""
 
 from dataclasses import dataclass, replace
 import functools
 
 import numpy as np
 from numpy.typing import NDArray
-from rrth_planner.kernels.collision.boxes import longest_ways
+from rrth_planner.execution.kept_sights import KeptSights, matched, sight_of, with_sight
+from rrth_planner.kernels.collision.containment import excesses
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.body_reach import FURTHEST, KNOWN_FOR
 from rrth_planner.model.scene import Scene
-from rrth_planner.model.separation import FASTEST, SeenBody, SeparationRules, speed_bound
+from rrth_planner.model.separation import reach_of, SeenBody, SeparationRules
 
-# A part that was faster than assumed is taken to be so fast, and a share more, for so long [s].
-SHARE, RAISED = 1.2, 2.0
-# Two sights of a part less than this apart do not give its speed [s].
+# A part that got further than assumed is taken to get further by so much and a share more, for so
+# long [s].
+SHARE, RAISED = 1.2, 1.0
+# Two sights of a part that are this near to each other are not compared [s].
 SHORTEST = 2e-3
-# Each sight is compared with one up to so long before, too [s]: between neighbouring ones, 120 Hz,
-# twice an error of 1 cm hides 2.4 m/s.
-WINDOW = 0.1
 # Clocks may differ by so much; the age of what was measured later than that [s].
 CLOCK_STEP, UNKNOWN_AGE = 0.1, 1e3
 
@@ -26,134 +26,121 @@ CLOCK_STEP, UNKNOWN_AGE = 0.1, 1e3
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class BodyMotion:
     """
-    The wearer as last seen, and what is assumed of the speeds of his parts.
+    The wearer as last seen, and what is assumed of how far his parts get.
 
     Parameters
     ----------
     measured : ndarray, shape (m,)
         When each box of the scene was measured [s].
-    earlier : Scene, ndarray
-        A sight up to `WINDOW` before, and its `measured`, which the next are compared with too.
-    speeds, until : ndarray, shape (m,)
-        Greatest speeds of parts that have been faster than assumed [m/s], and until when these
-        count [s].
-    n_seen, n_faster : int
-        Sights of all parts so far, and those of parts that had been faster than assumed.
-    faster : tuple of (str, float)
-        The parts that were it at the last sight: their names and speeds [m/s].
+    kept : KeptSights
+        Him as he was seen before, and last.
+    raised, until : ndarray, shape (m,)
+        By how much the reach of parts that got further than assumed is raised [m], and until
+        when [s].
+    n_seen, n_further : int
+        Sights of all parts so far, and those of parts that had got further than assumed.
+    further : tuple of (str, float)
+        The parts that had at the last sight: their names, and by how much [m].
 
     """
 
     scene: Scene
     measured: Array
-    earlier: tuple[Scene, Array]
-    speeds: Array
+    kept: KeptSights
+    raised: Array
     until: Array
     n_seen: int = 0
-    n_faster: int = 0
-    faster: tuple[tuple[str, float], ...] = ()
+    n_further: int = 0
+    further: tuple[tuple[str, float], ...] = ()
 
     def shifted(self, step: float) -> 'BodyMotion':
         """Return the wearer by a clock that was set forward by a step [s]."""
-        scene, measured = self.earlier
         return replace(
             self,
             measured=self.measured + step,
-            earlier=(scene, measured + step),
+            kept=self.kept.shifted(step),
             until=self.until + step,
         )
 
 
-def first_sight(scene: Scene, measured: Array) -> BodyMotion:
-    """Return a wearer who was never seen before, measured (m,) [s]."""
+def first_sight(scene: Scene, measured: Array, came: float) -> BodyMotion:
+    """Return a wearer who was never seen before, measured (m,), and who came now [s]."""
     nothing = np.zeros(len(scene.boxes))
-    return BodyMotion(
-        scene=scene, measured=measured, earlier=(scene, measured), speeds=nothing, until=nothing
-    )
+    kept = with_sight(KeptSights(), sight_of(scene, measured), came, -np.inf)
+    return BodyMotion(scene=scene, measured=measured, kept=kept, raised=nothing, until=nothing)
 
 
 def seen_again(
-    before: BodyMotion, scene: Scene, measured: Array, rules: SeparationRules
+    before: BodyMotion,
+    scene: Scene,
+    measured: Array,
+    rules: SeparationRules,
+    came: float,
+    since: float = -np.inf,
 ) -> BodyMotion:
     """
-    Return the wearer at his next sight; measured (m,): when each box of the scene was [s].
+    Return the wearer at his next sight, which came now [s].
 
-    A part moved faster than assumed where a corner of its box went further than its greatest speed
-    and two errors explain, since the sight before or since an earlier one. Its bound is raised for
-    a while then. Parts are known by their names.
+    measured (m,): when each box of the scene was [s]. A part got further than assumed where its
+    box is further out of one that was seen before than its reach and two errors explain. Its reach
+    is raised for a while then. It is compared with all kept sights that came since a time [s]:
+    what goes on and on is within its reach of the last one, and leaves that of an older one. Parts
+    are known by their names.
     """
-    old, names = places_of(before.scene, scene), scene.names
-    known = old >= 0
-    then, n = old[known], len(names)
-    speeds, until = np.zeros(n), np.zeros(n)
-    speeds[known], until[known] = before.speeds[then], before.until[then]
-    stated, raised = stated_speeds(scene, rules), np.where(measured <= until, speeds, 0.0)
-    bound, within, found = np.maximum(stated, raised), 2.0 * rules.body_error, np.zeros(n)
-    is_faster, is_raised = np.zeros(n, np.bool_), np.zeros(n, np.bool_)
-    for since in (before.earlier, (before.scene, before.measured)):
-        elapsed, moved = _moved_since(since, scene, measured)
-        # A sight that is no newer says nothing.
-        is_new = elapsed > SHORTEST
-        is_faster |= is_new & (moved > bound * elapsed + within)
-        # Its bound stays raised as long as it needs that.
-        needs = is_new & (moved > stated * elapsed + within)
-        is_raised |= needs
-        found[needs] = np.maximum(found, moved / np.maximum(elapsed, SHORTEST))[needs]
-    speeds[is_raised] = np.maximum(raised, np.minimum(SHARE * found, FASTEST))[is_raised]
-    until[is_raised] = measured[is_raised] + RAISED
-    newest, earliest = (float(m.max(initial=-np.inf)) for m in (measured, before.earlier[1]))
-    # A clock that was set back begins another window, and so does a wearer who was not there.
-    is_within = 0.0 <= newest - earliest < WINDOW
+    names, n = scene.names, len(scene.boxes)
+    raised, until, kept = before.raised, before.until, before.kept
+    last = before.measured
+    if before.scene.names != names:
+        old = places_of(before.scene, scene)
+        known, kept = old >= 0, matched(kept, old)
+        then = old[known]
+        raised, until, last = np.zeros(n), np.zeros(n), np.full(n, np.inf)
+        raised[known], until[known] = before.raised[then], before.until[then]
+        last[known] = before.measured[then]
+    sight, reach = sight_of(scene, measured), reach_of(names, rules)
+    found, excess = np.empty(n), np.zeros(n)
+    for earlier in kept.since(since):
+        excesses(
+            earlier,
+            sight,
+            reach.offsets,
+            reach.speeds,
+            reach.stated,
+            KNOWN_FOR,
+            SHORTEST,
+            2.0 * rules.body_error,
+            found,
+        )
+        np.maximum(excess, found, out=excess)
+    further: tuple[tuple[str, float], ...] = ()
+    if excess.any():
+        raised = np.where(measured <= until, raised, 0.0)
+        which = np.flatnonzero(excess > raised).tolist()
+        further = tuple((names[i], float(excess[i])) for i in which)
+        # Its reach stays raised as long as it needs that.
+        raised = np.maximum(raised, np.minimum(SHARE * excess, FURTHEST))
+        until = np.where(excess > 0.0, measured + RAISED, until)
     return BodyMotion(
         scene=scene,
         measured=measured,
-        earlier=before.earlier if is_within else (scene, measured),
-        speeds=speeds,
+        kept=with_sight(kept, sight, came, since),
+        raised=raised,
         until=until,
-        n_seen=before.n_seen + int(is_new.sum()),
-        n_faster=before.n_faster + int(is_faster.sum()),
-        faster=tuple((names[i], float(found[i])) for i in np.flatnonzero(is_faster)),
+        n_seen=before.n_seen + int((measured - last > SHORTEST).sum()),
+        n_further=before.n_further + len(further),
+        further=further,
     )
-
-
-def _moved_since(
-    before: tuple[Scene, Array], scene: Scene, measured: Array
-) -> tuple[Array, Array]:
-    """Return how long ago parts were at a sight [s], 0: never, and how far they moved [m]."""
-    (then, times), n = before, len(scene.boxes)
-    elapsed, moved = np.zeros(n), np.zeros(n)
-    if then.names == scene.names:
-        longest_ways(then.numbers, scene.numbers, moved)
-        return measured - times, moved
-    old = places_of(then, scene)
-    known = old >= 0
-    elapsed[known] = measured[known] - times[old[known]]
-    ways = np.empty(int(known.sum()))
-    longest_ways(then.numbers[old[known]], scene.numbers[known], ways)
-    moved[known] = ways
-    return elapsed, moved
 
 
 def body_at(body: BodyMotion, time: float, rules: SeparationRules) -> SeenBody:
     """Return the wearer at a time, as he was last seen [s]."""
-    raised = np.where(time <= body.until, body.speeds, 0.0)
-    speeds = np.maximum(stated_speeds(body.scene, rules), raised)
+    reach, is_raised = reach_of(body.scene.names, rules), time <= body.until
+    if is_raised.any():
+        reach = reach.raised(np.where(is_raised, body.raised, 0.0))
     ages = time - body.measured
     # Measured later than now: the clock was set back, and nobody knows how old that is.
     ages = np.where(ages < -CLOCK_STEP, UNKNOWN_AGE, np.maximum(ages, 0.0))
-    return SeenBody(body.scene, ages, speeds)
-
-
-def stated_speeds(scene: Scene, rules: SeparationRules) -> Array:
-    """Return the greatest speeds that are assumed of the boxes of a scene, (m,) [m/s]."""
-    return _speeds(scene.names, rules)
-
-
-@functools.lru_cache(maxsize=16)
-def _speeds(names: tuple[str, ...], rules: SeparationRules) -> Array:
-    speeds = np.array([speed_bound(rules, name) for name in names])
-    speeds.setflags(write=False)
-    return speeds
+    return SeenBody(body.scene, ages, reach)
 
 
 def places_of(before: Scene, after: Scene) -> NDArray[np.intp]:

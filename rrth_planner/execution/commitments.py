@@ -4,6 +4,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+import functools
 
 import numpy as np
 from rrth_planner.collision.separation import Blocked, first_unproven
@@ -98,18 +99,24 @@ class Sent:
         The message: its lead-in, then the commitment.
     lead : float
         How long the lead-in is [s].
+    seen : float
+        When the body came that it was proven with [s].
 
     """
 
     commitment: Commitment
     motion: ExecutingMotion
     lead: float
+    seen: float
 
     def shifted(self, step: float) -> 'Sent':
         """Return it by a clock that was set forward by a step [s]."""
         start = self.commitment.start_time + step
         return Sent(
-            changed(self.commitment, start_time=start), self.motion.shifted(step), self.lead
+            changed(self.commitment, start_time=start),
+            self.motion.shifted(step),
+            self.lead,
+            self.seen + step,
         )
 
 
@@ -136,8 +143,8 @@ class Commitments:
     body : BodyMotion or None
         The wearer; None: he was never seen.
     is_news : bool
-        Whether a part that is new, or was faster than assumed, has come since the newest
-        commitment was proven.
+        Whether a part that is new, or got further than assumed, has come since the newest
+        commitment was proven, or the body that this was proven with is kept no more.
     fault : str
         Why no motion may begin until a reset; empty: it may.
     is_reset : bool
@@ -237,11 +244,13 @@ def observe(
     # A stamp of the future is no younger than its reception.
     measured = np.minimum(measured, now)
     if known.body is None:
-        body, is_news = first_sight(scene, measured), known.is_news
+        body, is_news = first_sight(scene, measured, now), known.is_news
     else:
         is_new = bool((places_of(known.body.scene, scene) < 0).any())
-        body = seen_again(known.body, scene, measured, separation.rules)
-        is_news = known.is_news or is_new or bool(body.faster)
+        since = _compared_since(known, measured, separation, now)
+        body = seen_again(known.body, scene, measured, separation.rules, now, since)
+        is_forgotten = known.sent is not None and body.kept.begin > known.sent.seen
+        is_news = known.is_news or is_new or is_forgotten or bool(body.further)
     return changed(known, body=body, is_news=is_news, came=now, period=period)
 
 
@@ -260,7 +269,7 @@ def begin(
     found = first_commitment(planned.trajectory, planned.start_time, seen, settings)
     if isinstance(found, Blocked):
         return found
-    sent = _sent(found, planned, lead)
+    sent = _sent(found, planned, lead, known.came)
     return changed(
         known,
         planned=planned,
@@ -391,7 +400,12 @@ def check_news(known: Commitments, now: float) -> Commitments:
     if not known.has_lost_proof:
         return known
     assert known.sent is not None
-    return changed(known, is_news=not is_separate(known, known.sent.motion, now))
+    if not is_separate(known, known.sent.motion, now):
+        return known
+    # From now on it is proven with the present body.
+    sent = changed(known.sent, seen=known.came)
+    recent = tuple(sent if one is known.sent else one for one in known.recent)
+    return changed(known, sent=sent, recent=recent, is_news=False)
 
 
 def note_took(known: Commitments, took: float) -> Commitments:
@@ -462,7 +476,7 @@ def _extended(known: Commitments, now: float, is_clear: Callable[[Trajectory], b
     if not continues(lead, found.trajectory):
         # The arm is on its way to rest by then: from there the next one goes on.
         return as_before
-    sent = _sent(found, planned, lead)
+    sent = _sent(found, planned, lead, known.came)
     recent = known.recent
     if sum(one.commitment.start_time <= now for one in recent) > REMEMBERED:
         # A controller that has rejected all since would execute a whole rest to the end.
@@ -588,7 +602,35 @@ def _gap(commitment: Commitment, reading: JointReading, time_ago: float) -> floa
     return float(np.abs(state_at(curve, time)[0] - reading.positions).max())
 
 
-def _sent(commitment: Commitment, planned: ExecutingMotion, lead: Trajectory) -> Sent:
+def _compared_since(
+    known: Commitments, measured: Array, separation: Separation, now: float
+) -> float:
+    """
+    Return since when sights count for a body that came now [s].
+
+    measured, (m,): when each of its boxes was [s]. Since the one that any commitment was proven
+    with that is not over yet, and for as long at least as the next one is going to run after its
+    body was measured.
+    """
+    age = now - float(measured.max(initial=now - LONGEST_PERIOD))
+    horizon = age + known.within + separation.rules.controller_delay
+    horizon += _stretched(known, separation).stretch + _longest_stop(separation)
+    proven = (one.seen for one in known.recent if one.commitment.end_time > now)
+    return min([now - horizon, *proven])
+
+
+# One hardly ever changes.
+@functools.lru_cache(maxsize=4)
+def _longest_stop(separation: Separation) -> float:
+    """Return how long a stop takes at most, from an acceleration at its limit [s]."""
+    limits = separation.stop_limits
+    v, a, j = limits.rows
+    peak = np.minimum(a, np.sqrt(v * j))
+    fades = separation.limits.acceleration / j
+    return float((v / peak + peak / j + fades).max())
+
+
+def _sent(commitment: Commitment, planned: ExecutingMotion, lead: Trajectory, seen: float) -> Sent:
     """Return a commitment as it is sent, with what is commanded before it."""
     motion = changed(
         planned,
@@ -596,4 +638,4 @@ def _sent(commitment: Commitment, planned: ExecutingMotion, lead: Trajectory) ->
         start_time=commitment.start_time,
         escape_time=0.0,
     )
-    return Sent(commitment, led(lead, motion), lead.duration)
+    return Sent(commitment, led(lead, motion), lead.duration, seen)

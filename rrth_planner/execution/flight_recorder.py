@@ -27,8 +27,10 @@ from rrth_planner.model.scene import Scene, scene_of_bytes
 
 # How long it remembers, and after how long it keeps what is known by then [s].
 MEMORY, SEGMENT = 30.0, 1.0
-# What a file begins with, and how long the digest of a command is [bytes].
-MAGIC, DIGEST = b'rrth flight 1\n', 16
+# What a file begins with: the kind, and the version of its layout; others are rejected. How long
+# the digest of a command is [bytes].
+KIND, FORMAT, DIGEST = b'rrth flight ', b'2', 16
+MAGIC = KIND + FORMAT + b'\n'
 # A longer file is none of this [bytes].
 LONGEST = 2**28
 # Whose values a record may hold.
@@ -260,8 +262,11 @@ def read_flight(content: bytes) -> Flight:
         It is no such content.
 
     """
-    if not content.startswith(MAGIC) or len(content) > LONGEST:
+    if not content.startswith(KIND) or len(content) > LONGEST:
         raise RecordError('flight record: another file, expected one that a planner has saved')
+    if not content.startswith(MAGIC):
+        given = content[len(KIND) :].partition(b'\n')[0][:8].decode('ascii', 'replace')
+        raise RecordError(f'flight record: format {given}, expected {FORMAT.decode()}')
     try:
         rules, first, entries = _Reader(content[len(MAGIC) :], []).load()
         known = [_Reader(one, []).load() for one in rules]

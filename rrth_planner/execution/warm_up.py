@@ -36,7 +36,7 @@ def warm_up(
             check(running, 0.1, required, scene)
         fast_stop(motion, 0.1, stop_limits)
         if separation is not None:
-            seen = body_at(first_sight(scene, np.zeros(1)), 0.0, separation.rules)
+            seen = body_at(first_sight(scene, np.zeros(1), 0.0), 0.0, separation.rules)
             found = first_commitment(motion, 0.0, seen, separation)
             if isinstance(found, Commitment):
                 for instant in INSTANTS:

@@ -24,13 +24,14 @@ from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.planning.options import ALGORITHMS, TreeOptions
 
 # Version of the record's layout; others are rejected.
-FORMAT = 5
+FORMAT = 6
 MOST_FILES = 100
 # Of the numbers of a record, by the names of their fields.
 UNITS = {
     **dict.fromkeys((*LENGTHS, 'distance', 'radius', 'body_error'), 'm'),
     **dict.fromkeys(('time', 'escape_time', 'body_age', 'controller_delay'), 's'),
     **dict.fromkeys(('contact_speed', 'body_speeds'), 'm/s'),
+    'body_reach': 'm, m/s',
 }
 HEADER = '# An incident of rrth_planner. To replay it: ./run exec replay FILE\n'
 

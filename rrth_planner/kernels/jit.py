@@ -91,7 +91,7 @@ class Body(NamedTuple):
     A wearer as he was seen.
 
     boxes (m, 15), allowed (m,) and T_arm_base (4, 4) as for `boxes.rows_of`; by how much each box
-    is grown at time 0, growths (m,) [m], and its greatest speed, speeds (m,) [m/s].
+    is grown at time t: the least of its lines g + w t, growths and speeds (m, n) [m, m/s].
     """
 
     boxes: Any
@@ -116,7 +116,7 @@ class Points(NamedTuple):
 
 # As `Space`: from Python all their arrays are read-only.
 ARM = types.NamedTuple([int64, MAT, READ_INTS], Arm)
-BODY = types.NamedTuple([MAT, READ_INTS, MAT, VEC, VEC], Body)
+BODY = types.NamedTuple([MAT, READ_INTS, MAT, MAT, MAT], Body)
 POINTS = types.NamedTuple([VEC, MAT, MAT, MAT], Points)
 
 # A third: (space, path, n, how) -> number of waypoints of the path, made shorter in place; how:

@@ -12,12 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from rrth_planner.collision.reference_checker import bar_box_contact, bar_radii, bars
+from rrth_planner.collision.reference_checker import bar_box_contact, bar_radii, bars, protrusions
 from rrth_planner.execution.decision import Command
 from rrth_planner.kernels.layout import ROTATION, SIZE
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
-from rrth_planner.model.separation import speed_bound
+from rrth_planner.model.separation import reach_at, reach_of
 from rrth_planner.rehearsal.contacts import AT_REST, classes_of, distances_to, FAST, SLOW
 from rrth_planner.rehearsal.ray_time import seconds_by_class
 from rrth_planner.rehearsal.world import BEGIN, Wearer, World
@@ -32,8 +32,6 @@ SPARSE = 4
 MOVING = 0.01
 # Parts that are further away are not measured; for pictures [m].
 WITHIN, IN_PICTURES = 0.0, 0.6
-# The corners of a box, in halves of its size.
-_CORNERS = 0.5 * (np.indices((2, 2, 2)).reshape(3, 8).T * 2.0 - 1.0)
 
 
 @dataclass(slots=True)
@@ -44,7 +42,7 @@ class Testimony:
     Parameters
     ----------
     contacts : Counter
-        By class, and by whether the part had kept the speed that is assumed of it since the
+        By class, and by whether the part had got no further than is assumed of it since the
         wearer was seen whom the motion was proven with.
     sentences : list of str
         On contacts of the class FAST.
@@ -239,19 +237,19 @@ class Witness:
         if word == FAST and kept:
             self.testimony.sentences.append(
                 f'{time - BEGIN:.3f} s: bar {bar} at {speed:.2f} m/s and '
-                f'"{self._truth.names[box]}", which kept its speed'
+                f'"{self._truth.names[box]}", which got no further than assumed'
             )
 
     def _has_kept(self, sight: _Sight, box: int, row: Array, time: float) -> bool:
-        """Return whether a part has kept its speed since it was seen."""
+        """Return whether a part has got no further than assumed since it was seen."""
         name = self._truth.names[box]
         known = [one.name for one in sight.scene.boxes]
         if self._rules is None or name not in known:
             return False
         k = known.index(name)
-        way = np.linalg.norm(_corners(row) - _corners(sight.scene.boxes[k].numbers), axis=1).max()
-        longest = speed_bound(self._rules, name) * (time - float(sight.taken[k]))
-        return bool(way <= longest + self._rules.body_error)
+        elapsed = np.maximum([time - float(sight.taken[k])], 0.0)
+        furthest = reach_at(reach_of((name,), self._rules), elapsed)[0] + self._rules.body_error
+        return bool(protrusions(sight.scene.boxes[k].numbers, row) <= furthest)
 
     def _end(self, key: tuple[int, int]) -> None:
         contact = self._open.pop(key)
@@ -271,9 +269,3 @@ def _with_middles(values: Array) -> Array:
     found = np.empty((2 * len(values) - 1, *values.shape[1:]))
     found[::2], found[1::2] = values, 0.5 * (values[:-1] + values[1:])
     return found
-
-
-def _corners(row: Array) -> Array:
-    """Return the corners of a box, (8, 3) [m]."""
-    result: Array = row[:SIZE] + (_CORNERS * row[SIZE:ROTATION]) @ row[ROTATION:].reshape(3, 3).T
-    return result

@@ -9,7 +9,7 @@ pytest.importorskip('tqdm')
 from benchmarks.separation.adversary import chain_of_hands, FAST, Trial, trials
 from benchmarks.separation.durations import chain_of_timed
 from benchmarks.separation.lockstep import Controller
-from benchmarks.separation.people import beside_person, items, speed_lines, Take
+from benchmarks.separation.people import beside_person, items, reach_lines, Take
 from benchmarks.separation.reaching import EARLIEST, interception, Reaching
 from benchmarks.separation.reference import chain_of_motions
 from benchmarks.separation.setting import Case
@@ -20,7 +20,8 @@ from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.rehearsal.contacts import AT_REST, classes_of, distances_to, SLOW
 from worlds import table_1_arm
 
-STRICT = 'at the speeds assumed, strict'
+STEADY = 'for ever at the greatest speed'
+SHARP, STRICT = 'as far as assumed, stop 10/400', 'as far as assumed, strict'
 
 
 def hand_at(place):
@@ -28,14 +29,23 @@ def hand_at(place):
     return Scene((Box('hand', place, [0.1, 0.1, 0.1], np.eye(3)),))
 
 
-@pytest.mark.parametrize(('trial', 'n'), [(Trial(), 4), (trials()[STRICT], 2)])
-def test_a_part_that_keeps_its_speed_meets_no_faster_place_of_the_arm(trial, n):
+@pytest.mark.parametrize(
+    ('trial', 'n'), [(Trial(), 4), (trials()[SHARP], 4), (trials()[STRICT], 2)]
+)
+def test_a_part_that_gets_as_far_as_assumed_meets_no_faster_place_of_the_arm(trial, n):
     hands = chain_of_hands(trial, n, 0).hands
     assert len(hands) == n
-    # The arm moved, and they came near.
-    assert any(hand.was_moving for hand in hands)
+    # The arm moved, unless nothing may that he could reach, and they came near.
+    assert any(hand.was_moving for hand in hands) or trial.case.contact_speed == 0.0
     assert any(hand.word for hand in hands)
     assert not [hand for hand in hands if hand.word == FAST or hand.is_near]
+
+
+def test_a_part_that_goes_on_at_its_greatest_speed_is_noticed():
+    hands = chain_of_hands(trials()[STEADY], 6, 1).hands
+    far = [hand for hand in hands if hand.part != 'head']
+    assert len(far) > 3
+    assert all(hand.is_noticed for hand in far)
 
 
 @pytest.mark.parametrize(('k', 'seed'), [(0, 3), (1, 1), (2, 1)])
@@ -52,8 +62,8 @@ def test_a_part_with_any_name_that_is_seen_or_missing_meets_no_faster_place_of_t
 
 
 @pytest.mark.parametrize('what', [name for name in trials() if name.startswith('power')][::3])
-def test_the_test_finds_contacts_where_the_wearer_is_faster_or_separation_is_off(what):
-    # The monitor knows that a part is faster once it has seen that: most of them meet no one.
+def test_the_test_finds_contacts_where_the_wearer_gets_further_or_separation_is_off(what):
+    # The monitor knows that a part got further once it has seen that: most of them meet no one.
     assert any(hand.word == FAST for hand in chain_of_hands(trials()[what], 5, 2).hands)
 
 
@@ -78,12 +88,12 @@ def test_beside_a_wearer_at_rest_no_motion_stops_on_its_way(dead, stop):
 
 
 @pytest.mark.parametrize('item', items(Take('', 1.0))[:2])
-def test_a_recorded_person_is_never_met_by_a_fast_place_while_he_keeps_his_speed(item):
+def test_a_recorded_person_is_never_met_by_a_fast_place_while_he_gets_no_further(item):
     record = beside_person(0.5, item)
     assert record.n_plans
     assert record.n_steps['right hand'] == 59
     assert not record.contacts[FAST, True]
-    assert len(speed_lines([record])) == 3
+    assert len(reach_lines([record])) == 3
 
 
 def test_contacts_are_classified_by_the_speed_of_the_arm_there():
@@ -103,11 +113,14 @@ def test_a_part_that_leaves_goes_where_it_intercepts_the_arm():
     q, v = np.zeros((len(times), 4)), np.zeros((len(times), 4))
     q[:, 1], v[:, 1] = -0.3 + 0.5 * times, 0.5
     scene = hand_at(tool_pose(arm, q[100])[:3, 3] + [0.0, 0.0, 0.8])
-    wearer = Reaching(scene, 0, 2.0)
-    direction = interception(arm, times, q, v, scene.numbers[0], 2.0, 0.1, EARLIEST)
-    wearer.head_for(2.0 * direction, 0.0)
+    lines = ((0.0, 3.0), (0.1, 2.0))
+    wearer = Reaching(scene, 0, lines)
+    ways = wearer.ways_ahead(0.0, times)
+    assert ways == pytest.approx(np.minimum(3.0 * times, 0.1 + 2.0 * times))
+    direction = interception(arm, q, v, scene.numbers[0], ways, 0.1, EARLIEST)
+    wearer.head_for(direction, 0.0)
     rows = wearer.rows(times)
-    assert np.linalg.norm(np.diff(rows[:, 0, :3], axis=0), axis=1) == pytest.approx(0.01)
+    assert np.linalg.norm(rows[:, 0, :3] - rows[0, 0, :3], axis=1) == pytest.approx(ways)
     found = distances_to(arm, q, v, ('hand',), rows, 0.1, 1.0)
     # It is there as soon as it can be, to a step.
     assert found.fast.min() < 0.005

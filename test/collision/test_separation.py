@@ -14,8 +14,15 @@ from rrth_planner.collision.separation_checker import first_separation_violation
 from rrth_planner.io.wearer_file import load_body
 from rrth_planner.kernels.collision.separation import fast_part, within_distance
 from rrth_planner.model.arm import ArmModel, bars_of, Capsule
+from rrth_planner.model.body_reach import KNOWN_FOR
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.separation import growth_at, seen_body, Separation, SeparationRules
+from rrth_planner.model.separation import (
+    growth_at,
+    Reach,
+    seen_body,
+    Separation,
+    SeparationRules,
+)
 from rrth_planner.model.trajectory import MotionLimits, part_of, sample, Trajectory
 from sample_motions import motion_of
 from worlds import random_boxes, random_chain, random_rotation, seeded_capsule_arm, table_1_arm
@@ -35,6 +42,22 @@ def arms():
     chains = [random_chain(np.random.default_rng(seed), True) for seed in (1, 29)]
     assert all(any(arm.is_prismatic) and arm.radii.any() for arm in chains)
     return (table_1_arm(0.03), seeded_capsule_arm(0), *chains)
+
+
+def random_reach(rng, m, share):
+    """Return the reach of boxes by random lines, of which several are the least in turn."""
+    n = rng.integers(1, 5)
+    offsets = np.sort(rng.uniform(0.0, 0.5, (m, n)), axis=1)
+    offsets[:, 0] = 0.0
+    # The first is the steepest, the last may even be level.
+    speeds = np.sort(rng.uniform(0.0, 4.0, (m, n)), axis=1)[:, ::-1]
+    speeds[rng.random(m) < 0.2, -1] = 0.0
+    return Reach(share * offsets, share * speeds, share * rng.uniform(0.0, 2.0, m))
+
+
+def steady_reach(m, speed):
+    """Return the reach of boxes of one greatest speed [m/s]."""
+    return Reach(np.zeros((m, 1)), np.full((m, 1), speed), np.full(m, speed))
 
 
 def margins_at(arm, body, motion, rules, times):
@@ -74,7 +97,8 @@ def cases(contact_speed):
         scene = load_body() if rng.random() < 0.2 else random_boxes(rng, 2, 1.0, 0.3)
         body = seen_body(scene, rng.uniform(0.0, 0.3, len(scene.boxes)), rules)
         # At full speed all meet within a second.
-        body = replace(body, speeds=rng.choice([0.0, 0.05, 0.3]) * body.speeds)
+        share = rng.choice([0.0, 0.05, 0.3])
+        body = replace(body, reach=random_reach(rng, len(scene.boxes), share))
         motion = motion_of(rng, arm)
         if motion.duration < 2.5:
             margin, time = greatest_margin(arm, body, motion, rules)
@@ -127,7 +151,9 @@ def test_motions_anywhere_near_a_wearer_are_blocked_no_later_than_they_violate(c
         rules = replace(RULES, contact_speed=contact_speed)
         scene = load_body() if rng.random() < 0.5 else random_boxes(rng, 3)
         body = seen_body(scene, rng.uniform(0.0, 0.3, len(scene.boxes)), rules)
-        body = replace(body, speeds=rng.choice([0.0, 0.1, 1.0]) * body.speeds)
+        if rng.random() < 0.7:
+            share = rng.choice([0.0, 0.1, 1.0])
+            body = replace(body, reach=random_reach(rng, len(scene.boxes), share))
         motion = motion_of(rng, arm)
         blocked = first_unproven(motion, 0.0, arm, body, rules, 0.02)
         every = separation_violations(arm, body, motion, rules, 0.02, period=0.01)
@@ -204,7 +230,8 @@ def test_what_is_proven_stays_so_for_a_body_seen_later_and_for_the_rest_of_the_m
 
 def test_a_body_seen_longer_ago_is_no_nearer_than_its_speed_permits():
     for arm, body, motion, rules, margin, _ in cases(0.0):
-        moving = replace(body, speeds=np.full(len(body.speeds), 0.2), ages=0.0 * body.ages)
+        reach = steady_reach(len(body.ages), 0.2)
+        moving = replace(body, reach=reach, ages=0.0 * body.ages)
         base = replace(rules, controller_delay=0.0)
         margin, _ = greatest_margin(arm, moving, motion, base)
         if not 0.0 < margin < NEAR:
@@ -212,10 +239,91 @@ def test_a_body_seen_longer_ago_is_no_nearer_than_its_speed_permits():
         # So long ago it may have come by just that much.
         for extra, is_proven in ((-1e-3, True), (1e-5, False)):
             age = max(0.0, (margin + extra) / 0.2)
-            older = replace(moving, ages=np.full(len(body.speeds), age))
+            older = replace(moving, ages=np.full(len(body.ages), age))
             late = replace(base, controller_delay=age)
             assert (first_unproven(motion, 0.0, arm, older, base, 0.0) is None) == is_proven
             assert (first_unproven(motion, 0.0, arm, moving, late, 0.0) is None) == is_proven
+
+
+@pytest.mark.parametrize('contact_speed', [0.0, 0.1])
+def test_what_is_proven_by_lines_is_so_at_random_instants(contact_speed):
+    rng, n_instants = np.random.default_rng(9), 0
+    rules = replace(RULES, contact_speed=contact_speed)
+    for i in range(120):
+        arm = arms()[i % len(arms())]
+        scene, motion = random_boxes(rng, 3, 1.5, 0.3), motion_of(rng, arm)
+        ages = rng.uniform(0.0, rng.choice([0.1, 3.0]), len(scene.boxes))
+        reach = random_reach(rng, len(ages), rng.choice([0.1, 0.3, 1.0]))
+        body = replace(seen_body(scene, ages, rules), reach=reach)
+        if first_unproven(motion, 0.0, arm, body, rules, 0.02) is not None:
+            continue
+        times = rng.uniform(0.0, motion.duration, 400)
+        q, v, _ = sample(motion, times)
+        # By the words of the definition.
+        elapsed = (times[:, None] + rules.controller_delay + ages)[..., None]
+        growths = (reach.offsets + reach.speeds * elapsed).min(axis=-1)
+        beyond = elapsed[..., 0] > KNOWN_FOR
+        growths = np.where(beyond, np.maximum(growths, reach.stated * elapsed[..., 0]), growths)
+        growths += 0.02 + rules.body_error
+        assert (fast_distances(arm, scene, q, v, contact_speed, growths) >= growths[:, None]).all()
+        n_instants += len(times)
+    assert n_instants > 4000
+
+
+def test_lines_beside_each_other_prove_and_permit_what_any_of_them_does():
+    rng, n_proven, n_permitted = np.random.default_rng(8), 0, 0
+    limits = MotionLimits([1.5] * 4, [4.0] * 4, [40.0] * 4)
+    for _ in range(40):
+        arm = table_1_arm(0.03)
+        settings = Separation(
+            arm=arm, rules=RULES, limits=limits, stop_limits=limits, stretch=0.02, margin=0.02
+        )
+        scene, motion = random_boxes(rng, 2, 1.2, 0.2), motion_of(rng, arm)
+        reach = random_reach(rng, len(scene.boxes), 0.3)
+        body = replace(seen_body(scene, rng.uniform(0.0, 0.1, 2), RULES), reach=reach)
+        places = np.linspace(0.0, motion.duration, 20)
+        is_proven = first_unproven(motion, 0.0, arm, body, RULES, 0.02) is None
+        rates = permitted_ahead(motion, places, 15, body, settings, 0.02)[:, 0]
+        n = reach.offsets.shape[1]
+        alone = [
+            replace(body, reach=Reach(reach.offsets[:, [k]], reach.speeds[:, [k]], reach.stated))
+            for k in range(n)
+        ]
+        for one in alone:
+            is_one_proven = first_unproven(motion, 0.0, arm, one, RULES, 0.02) is None
+            assert is_proven or not is_one_proven
+            own = permitted_ahead(motion, places, 15, one, settings, 0.02)[:, 0]
+            assert (rates >= own).all()
+            n_permitted += int((rates > own + 0.1).any())
+            n_proven += is_proven and not is_one_proven
+    assert n_proven > 3
+    assert n_permitted > 10
+
+
+@pytest.mark.parametrize('age', [0.0, 0.1, 0.5])
+def test_until_when_a_bar_is_out_of_reach_is_when_the_least_line_gets_there(age):
+    # At 0.3 m/s its tip needs 0.2 s to stop: it may be so fast where a hand needs longer.
+    limits = MotionLimits([2.0], [2.0], [1e4])
+    motion = steady_motion(1.0)
+    settings = Separation(
+        arm=turning_arm(), rules=RULES, limits=limits, stop_limits=limits, stretch=0.0, margin=0.0
+    )
+    low = 0.0
+    for gap in np.linspace(0.05, 3.0, 60):
+        scene = box_at((0.0, 0.0, RADIUS + gap + 1.0), (9.0, 9.0, 2.0))
+        body = seen_body(scene, age, RULES)
+        rate = permitted_ahead(motion, np.linspace(0.0, 0.3, 11), 1, body, settings, 0.0)[0, 0]
+        # A place s of the bar has stopped by then: w s = v_c.
+        stops = np.linspace(0.0, 2.0, 4001)
+        growths = np.array([growth_at(body, RULES, 0.0, time)[0] for time in stops])
+        latest = stops[growths < gap].max(initial=0.0)
+        fastest = RULES.contact_speed / (LENGTH + RADIUS)
+        permitted = min(1.0, fastest + limits.acceleration[0] * latest)
+        # By steps of the search and of instants.
+        assert rate == pytest.approx(permitted, abs=0.15)
+        assert rate >= low
+        low = rate
+    assert low == 1.0
 
 
 def turning_arm(T_base_mount=None, allowed=()):
@@ -264,7 +372,8 @@ def test_a_bar_that_turns_below_a_plate_is_proven_up_to_its_distance():
         T = np.eye(4)
         T[:3, :3], T[:3, 3] = random_rotation(rng), rng.uniform(-1.0, 1.0, 3)
         age, margin = rng.uniform(0.0, 0.3), rng.uniform(0.0, 0.05)
-        growth = margin + 0.01 + 2.0 * (0.4 + 0.01 + age)
+        hand = seen_body(box_at((0.0, 0.0, 0.0), (1.0,) * 3), age, RULES)
+        growth = growth_at(hand, RULES, margin, 0.4)[0]
         for gap, is_proven in ((-1e-5, False), (2e-4, True)):
             at = T[:3, 3] + T[:3, 2] * (RADIUS + growth + gap + 0.1)
             body = seen_body(box_at(at, (2.0, 2.0, 0.2), rotation=T[:3, :3]), age, RULES)

@@ -76,9 +76,12 @@ def boxes(draw):
 @st.composite
 def rules(draw):
     speed = st.floats(0.0, 100.0)
+    others = st.lists(st.tuples(st.floats(0.0, 10.0), speed), max_size=3)
+    reach = st.builds(lambda v, lines: ((0.0, v), *lines), speed, others)
     return SeparationRules(
         contact_speed=draw(speed),
         body_speeds=(*draw(st.lists(st.tuples(LINES, speed), max_size=3)), ('', draw(speed))),
+        body_reach=draw(st.none() | st.lists(st.tuples(LINES, reach), max_size=3).map(tuple)),
         body_error=draw(st.floats(0.0, 10.0)),
         controller_delay=draw(st.floats(0.0, 10.0)),
     )
@@ -254,7 +257,7 @@ del_ = object()
 @pytest.mark.parametrize(
     ('path', 'value', 'sentence'),
     [
-        (('format',), 1, 'format: 1, expected 5'),
+        (('format',), 1, 'format: 1, expected 6'),
         (('kind',), 'storm', "kind: 'storm', expected disagreement or error"),
         (('kind',), [], 'kind: '),
         (('question',), None, 'question: None, expected a mapping'),
@@ -273,8 +276,13 @@ del_ = object()
         (('question', 'scene', 'boxes'), 7, 'scene: boxes: 7, expected a list'),
         (('question', 'scene', 'boxes'), [7], 'scene: boxes[0]: 7, expected a mapping'),
         (('question', 'body_age'), -1.0, 'body_age: -1.0, expected a number from 0'),
-        (('question', 'rules'), {}, 'rules: no contact_speed, body_speeds, body_error'),
+        (
+            ('question', 'rules'),
+            {},
+            'rules: no contact_speed, body_speeds, body_reach,',
+        ),
         (('question', 'rules', 'body_speeds'), [['hand']], 'rules: body_speeds'),
+        (('question', 'rules', 'body_reach'), [['hand', 3.0]], 'rules: body_reach'),
         (('question', 'rules', 'contact_speed'), -1.0, 'contact_speed: -1.0, expected 0 to 100'),
         (('question', 'moving'), {}, 'moving: no state, running, time, expected'),
         (('trajectory',), None, 'incident: a disagreement without trajectory and violation'),

@@ -170,7 +170,7 @@ def test_pages_hold_the_tables_that_are_made_from_the_code():
     for page, text in pages().items():
         assert written(text) == text, f'{page}: another table now; ./run docs writes it anew'
         n += text.count('<!-- end -->')
-    assert n == 2 * len(NODES) + 1
+    assert n == 2 * len(NODES) + 2
 
 
 def test_pages_start_no_command_and_give_no_option_that_there_is_not():

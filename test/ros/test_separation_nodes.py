@@ -21,6 +21,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from rrth_planner.collision.reference_checker import separation_violations  # noqa: E402
 from rrth_planner.execution.command import begin_of  # noqa: E402
 from rrth_planner.model.arm import pointing_error  # noqa: E402
+from rrth_planner.model.body_reach import BODY_REACH, lines_shown  # noqa: E402
 from rrth_planner.model.scene import Scene  # noqa: E402
 from rrth_planner.model.separation import seen_body, SeparationRules  # noqa: E402
 from rrth_planner.model.trajectory import part_of  # noqa: E402
@@ -162,9 +163,10 @@ def test_all_that_the_arm_is_given_is_separate_and_leads_to_the_target(separated
     assert np.abs(np.array(planned.points[-1].positions) - client.positions()).max() < 1e-3
     assert client.said[0].message == 'NORMAL'
     wait_until(lambda: client.clear and client.clear[-1].data)
-    shown = client.figures['greatest speeds'].split(', ')
-    assert shown[:2] == ['"torso" 0 m/s (torso)', '"head" 1 m/s (head)']
-    assert '"upper_arm_left" 1.6 m/s (upper arm)' in shown
+    shown = client.figures['reach [m]'].split('; ')
+    lines = {words: lines_shown(found) for words, found in BODY_REACH}
+    assert shown[:2] == ['"torso" 0 t (torso)', f'"head" {lines["head"]} (head)']
+    assert f'"upper_arm_left" {lines["upper arm"]} (upper arm)' in shown
 
 
 def test_an_arm_whose_planner_is_killed_comes_to_rest_where_it_was_told(

@@ -19,7 +19,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy  # noqa: E402
 from rrth_planner.cli.parsers import wearer as wearer_parser  # noqa: E402
 from rrth_planner.io.motion_capture_file import load_person  # noqa: E402
 from rrth_planner.io.skeleton_file import load_skeleton  # noqa: E402
-from rrth_planner.model.separation import governing_speed, SeparationRules  # noqa: E402
+from rrth_planner.model.separation import SeparationRules, speed_bound  # noqa: E402
 from rrth_planner.ros.client.stand_in_publisher import DRIVERS  # noqa: E402
 from rrth_planner.ros.messages.posture import (  # noqa: E402
     BODY_FORMATS,
@@ -274,7 +274,7 @@ def test_others_are_boxes_and_a_change_of_person_needs_a_reset():
         # A person high and broad; in the base frame his side is to the right or to the left.
         assert abs(np.hypot(p.x, p.y) - 2.0) < 0.3
         assert s.z > 1.4
-        assert governing_speed(SeparationRules(), 'person 2')[1] == 2.0
+        assert speed_bound(SeparationRules(), 'person 2') == 2.0
         # Whoever leaves is deleted by name, again and again, and then forgotten.
         boxes = scene.boxes((1, 0.0))
         assert boxes['person 2'].action == Marker.DELETE

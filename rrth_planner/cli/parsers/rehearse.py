@@ -23,7 +23,7 @@ scenarios that come along, by name or as a file to be copied (config/scenarios):
   lost_hand          a tracker loses a hand, and frames
   dead_planner       a planner gives no answers for a while
 
-exit codes: 0  no contact faster than contact_speed with a part that kept its speed
+exit codes: 0  no contact faster than contact_speed with a part that got no further than assumed
             1  there was one
             2  the scenario cannot be rehearsed (the reason is printed)
 

@@ -9,14 +9,12 @@ import numpy as np
 from rrth_planner.kernels import scratch
 from rrth_planner.kernels.jit import (
     CUBE,
-    fused,
     kernel,
     MAT,
     OUT_INTS,
     OUT_MAT,
     OUT_VEC,
     READ_INTS,
-    VEC,
 )
 from rrth_planner.kernels.layout import (
     ALLOWED_BITS,
@@ -119,36 +117,6 @@ def rows_of(boxes, allowed, T_arm_base, growth, rows):
         for n in range(2):
             rows[BOX_ALLOWED + n, i] = (allowed[i] >> ALLOWED_BITS * n) & LOW_BITS
         rows[ANY_ALLOWED, i] = 0.0 if allowed[i] == 0 else 1.0
-
-
-@kernel(float64(VEC, int64, int64), is_inner=True, is_exact=True)
-def corner_of(box, corner, r):
-    """Return a coordinate of one of the eight corners of a box, (15,) [m]."""
-    x = (0.5 if corner & 4 else -0.5) * box[SIZE]
-    y = (0.5 if corner & 2 else -0.5) * box[SIZE + 1]
-    z = (0.5 if corner & 1 else -0.5) * box[SIZE + 2]
-    at = ROTATION + 3 * r
-    return box[r] + fused(z, box[at + 2], fused(y, box[at + 1], x * box[at]))
-
-
-@kernel(void(MAT, MAT, OUT_VEC), is_short=True, is_exact=True)
-def longest_ways(before, after, ways):
-    """
-    Write how far the corner of each box went that went furthest, (n,) [m].
-
-    before, after (n, 15): the boxes at two times. Numbers as of numpy, rounded alike.
-    """
-    for i in range(before.shape[0]):
-        longest = 0.0
-        for corner in range(8):
-            square = 0.0
-            for r in range(3):
-                there = corner_of(after[i], corner, r)
-                way = there - corner_of(before[i], corner, r)
-                square += way * way
-            # Also for NaN, which counts as far.
-            longest = longest if square <= longest else square
-        ways[i] = math.sqrt(longest)
 
 
 @kernel(boolean(MAT, int64, int64))

@@ -147,24 +147,51 @@ def fast_part(begin, end, contact, part):
     return True
 
 
+@kernel(float64(MAT, MAT, int64, float64), is_inlined=True, is_inner=True)
+def growth_of(growths, speeds, box, time):
+    """
+    Return by how much a box is grown at a time: the least of its lines [m].
+
+    growths, speeds (m, n): its lines g + w t [m, m/s].
+    """
+    least = math.inf
+    for k in range(growths.shape[1]):
+        least = min(least, growths[box, k] + speeds[box, k] * time)
+    return least
+
+
+@kernel(float64(MAT, MAT, int64, float64), is_inlined=True, is_inner=True)
+def time_until(growths, speeds, box, room):
+    """
+    Return until when a box is grown by no more than some room, -1: it is by more at time 0 [s].
+
+    The least of its lines is no more than that as long as any of them is. What never grows beyond
+    it is not asked about.
+    """
+    latest = -1.0
+    for k in range(growths.shape[1]):
+        if speeds[box, k] > 0.0:
+            latest = max(latest, (room - growths[box, k]) / speeds[box, k])
+    return latest if latest >= 0.0 else -1.0
+
+
 @kernel(
-    int64(MAT, float64, float64, float64, READ_INTS, CHAIN, MAT, MAT, VEC, VEC, MAT, MAT),
+    int64(MAT, float64, float64, READ_INTS, CHAIN, MAT, MAT, VEC, MAT, MAT),
     is_inner=True,
 )
-def blocking_box(
-    part, begin, end, contact, bodies, chain, robot, rows, growths, speeds, quartic, cubic
-):
+def blocking_box(part, width, contact, bodies, chain, robot, rows, grown, quartic, cubic):
     """
     Return which box is not proven apart from an arm in motion, bar * m + box; -1: none.
 
-    part (6, dof): the motion between two times [s], over u from 0 to 1; contact: speed up to which
-    a point of the arm counts as at rest [m/s]; bodies (n_bars,): how many joints move each bar,
-    the pointing ray left out; rows (18, m), growths at time 0 and speeds (m,): the boxes; quartic
-    and cubic as for `quintics.bound`. With dp the way of an end of a bar and b the bound of its
+    part (6, dof): the motion in an interval of some width [s], over u from 0 to 1; contact: speed
+    up to which a point of the arm counts as at rest [m/s]; bodies (n_bars,): how many joints move
+    each bar, the pointing ray left out; rows (18, m): the boxes, grown (m,): by how much they are
+    grown at the end of the interval, when they have grown most; quartic and cubic as for
+    `quintics.bound`. With dp the way of an end of a bar and b the bound of its
     second derivative by u, it is no faster than |dp| + b / 2, and within |dp| / 2 + b / 8 of the
     mean of its two places (`docs/algorithms.md`).
     """
-    dof, m, width, n_bars = part.shape[1], rows.shape[1], end - begin, bodies.shape[0]
+    dof, m, n_bars = part.shape[1], rows.shape[1], bodies.shape[0]
     q, middle, after = (
         scratch.floats(MAX_DOF),
         scratch.floats(ENDS_ROOM),
@@ -208,7 +235,7 @@ def blocking_box(
         for box in range(m):
             if may_meet(rows, box, bar):
                 continue
-            needed = radius + strays + growths[box] + speeds[box] * end
+            needed = radius + strays + grown[box]
             # Also for NaN, which must never count as apart.
             if not (within_distance(middle, at, share[0], share[1], needed, rows, box) > needed):
                 return bar * m + box
@@ -231,7 +258,7 @@ def first_blocked(points, begin, contact, arm, body, quartic, cubic, found):
     chain = as_chain(address)
     n_pieces, dof = positions.shape[0] - 1, positions.shape[1]
     curves, part = np.empty((n_pieces, 6, dof)), np.empty((6, dof))
-    rows = np.empty((BOX_ROWS, boxes.shape[0]))
+    rows, grown = np.empty((BOX_ROWS, boxes.shape[0])), np.empty(boxes.shape[0])
     fit(times, positions, velocities, accelerations, curves)
     rows_of(boxes, allowed, T_arm_base, 0.0, rows)
     for i in range(n_pieces):
@@ -248,8 +275,10 @@ def first_blocked(points, begin, contact, arm, body, quartic, cubic, found):
                 right = 1.0
             cut(curves[i], left, right, part)
             t, end = times[i] + left * length, times[i] + right * length
+            for box in range(boxes.shape[0]):
+                grown[box] = growth_of(growths, speeds, box, end)
             blocking = blocking_box(
-                part, t, end, contact, bodies, chain, robot, rows, growths, speeds, quartic, cubic
+                part, end - t, contact, bodies, chain, robot, rows, grown, quartic, cubic
             )
             if blocking >= 0:
                 if step <= smallest:
@@ -292,15 +321,15 @@ def stop_time(v, a, j):
 
 
 @kernel(
-    void(OUT_VEC, READ_INTS, int64, MAT, MAT, VEC, VEC, OUT_VEC),
+    void(OUT_VEC, READ_INTS, int64, MAT, MAT, MAT, MAT, OUT_VEC),
     is_inner=True,
 )
 def latest_times(points, bodies, dof, robot, rows, growths, speeds, latest):
     """
     Write until when each section of the bars is out of reach of the boxes, (n_bars * SECTIONS,).
 
-    points: the bars at a place; growths, speeds (m,): of the boxes at time 0 [s]. Below 0: it is
-    within a box then already.
+    points: the bars at a place; growths, speeds (m, n): lines of the boxes. Below 0: it is within
+    a box at time 0 already.
     """
     m, line = rows.shape[1], scratch.floats(6)
     for bar in range(bodies.shape[0]):
@@ -313,18 +342,17 @@ def latest_times(points, bodies, dof, robot, rows, growths, speeds, latest):
                 continue
             line_from_box(points, at, rows, box, line)
             # Further from the whole bar it matters to no section.
-            if line_gap(line, rows, box) > radius + growths[box] + speeds[box] * last:
+            if line_gap(line, rows, box) > radius + growth_of(growths, speeds, box, last):
                 continue
             last = -1.0
             for section in range(SECTIONS):
                 low, high = section / SECTIONS, (section + 1) / SECTIONS
                 best = latest[SECTIONS * bar + section]
                 # Nearer than this it matters.
-                within = radius + growths[box] + speeds[box] * best
-                near = part_within(line, low, high, within, rows, box)
-                room = near - radius - growths[box]
-                if room < speeds[box] * best:
-                    best = room / speeds[box] if speeds[box] > 0.0 and room >= 0.0 else -1.0
+                grown = growth_of(growths, speeds, box, best)
+                room = part_within(line, low, high, radius + grown, rows, box) - radius
+                if room < grown:
+                    best = time_until(growths, speeds, box, room)
                     latest[SECTIONS * bar + section] = best
                 last = max(last, best)
 

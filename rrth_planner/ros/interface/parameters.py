@@ -25,6 +25,7 @@ from rrth_planner.io.settings import (
 )
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import frozen_array
+from rrth_planner.model.body_reach import BODY_REACH, lines_of_text, lines_shown
 from rrth_planner.model.errors import ModelError, OptionsError, RrthError, shown
 from rrth_planner.model.required_clearance import RequiredClearance
 from rrth_planner.model.separation import BODY_SPEEDS, Separation, SeparationRules
@@ -50,6 +51,7 @@ START_TOLERANCE = 2e-3
 
 RULES = SeparationRules()
 SPEEDS = [f'{words}: {speed:g}' for words, speed in BODY_SPEEDS]
+REACH = [f'{words}: {lines_shown(lines)}' for words, lines in BODY_REACH]
 
 
 def declared(dof: int) -> tuple[Setting, ...]:
@@ -74,6 +76,10 @@ def declared(dof: int) -> tuple[Setting, ...]:
         'stands still, as one that was sent once'
     )
     meeting = 'greatest speed of a part of the arm that may meet the wearer'
+    reaching = (
+        'how far parts of the body get within t seconds, by whole words of their texts: the least '
+        'of the lines; default: not with body_speeds of your own'
+    )
     moving = (
         'greatest speeds of parts of the body by whole words of their texts, 0 by the whole text; '
         'the greatest of those that fit'
@@ -131,6 +137,7 @@ def declared(dof: int) -> tuple[Setting, ...]:
             is_dynamic=True,
         ),
         Setting('contact_speed', RULES.contact_speed, 'm/s', meeting, 0.0, 10.0),
+        Setting('body_reach', REACH, 'words: m + m/s t', reaching),
         Setting('body_speeds', SPEEDS, 'words: m/s', moving),
         Setting('body_error', RULES.body_error, 'm', 'greatest error of a box', 0.0, 1.0),
         Setting('controller_delay', RULES.controller_delay, 's', late, 0.0, 1.0),
@@ -295,7 +302,20 @@ def _stop_limits(values: Mapping[str, Any], limits: MotionLimits) -> MotionLimit
 
 def _separation_rules(values: Mapping[str, Any]) -> SeparationRules:
     """Return the rules that parameters describe; also where they are not used."""
-    speeds = []
+    reach, speeds = [], []
+    for entry in values['body_reach'] or ():
+        words, colon, text = entry.rpartition(':')
+        if not colon and not text.strip():
+            continue
+        try:
+            reach.append((words.strip(), lines_of_text(text)))
+        except ValueError:
+            colon = ''
+        if not colon:
+            raise OptionsError(
+                f'body_reach: "{entry}", expected words of a name and lines, as "hand: 3.6 t, '
+                '0.21 + 1.45 t" [m, m/s]'
+            )
     for entry in values['body_speeds'] or ():
         words, colon, speed = entry.rpartition(':')
         try:
@@ -310,6 +330,7 @@ def _separation_rules(values: Mapping[str, Any]) -> SeparationRules:
     return SeparationRules(
         contact_speed=values['contact_speed'],
         body_speeds=tuple(speeds),
+        body_reach=None if list(values['body_reach'] or ()) == REACH else tuple(reach),
         body_error=values['body_error'],
         controller_delay=values['controller_delay'],
     )

@@ -7,13 +7,15 @@ from pathlib import Path
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+import numpy as np
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rrth_planner.execution.body_motion import body_at, BodyMotion, RAISED, SHARE
+from rrth_planner.execution.body_motion import BodyMotion, RAISED, SHARE
 from rrth_planner.execution.separation_status import NO_PROMISE, SeparationState, SeparationStatus
+from rrth_planner.model.body_reach import lines_shown
 from rrth_planner.model.errors import one_line
-from rrth_planner.model.separation import governing_speed, SeparationRules
+from rrth_planner.model.separation import governing_reach, SeparationRules
 from rrth_planner.model.status import ErrorCode
 from rrth_planner.requests.outcome import Outcome
 from rrth_planner.ros.interface.figures import Figures
@@ -34,12 +36,12 @@ SEVERITY = (
     DiagnosticStatus.STALE,
     DiagnosticStatus.ERROR,
 )
-# Warnings of fast parts are logged at most this often [s].
+# Warnings of parts that got further than assumed are logged at most this often [s].
 WARNING_PERIOD = 5.0
 # A rate is published again once it has changed by so much [-].
 RATE_STEP = 0.05
-# The diagnostics name the speeds of so many boxes.
-MOST_SPEEDS = 100
+# The diagnostics name the reach of so many boxes.
+MOST_BOXES = 100
 # Number of lost parts that are remembered as reported.
 MOST_NAMED = 1000
 # Changes are published at most this often; the last one always is [s].
@@ -113,13 +115,13 @@ class Reporter:
         self._commitments.add(elapsed)
 
     def body_observed(self, body: BodyMotion) -> None:
-        """Keep what is known of the wearer's speeds, and log who was faster than assumed."""
+        """Keep what is known of the wearer, and log which parts got further than assumed."""
         self._body = body
-        if body.faster:
-            named = ', '.join(f'{one_line(name)}: {v:.1f} m/s' for name, v in body.faster)
+        if body.further:
+            named = ', '.join(f'{one_line(name)} by {100 * x:.0f} cm' for name, x in body.further)
             self._node.get_logger().warning(
-                f'faster than body_speeds: {named}; for {RAISED:g} s assumed to be {SHARE:g} '
-                'times as fast',
+                f'further than assumed: {named}; for {RAISED:g} s assumed to get {SHARE:g} '
+                'times that further',
                 throttle_duration_sec=WARNING_PERIOD,
             )
 
@@ -271,17 +273,17 @@ class Reporter:
         """Return what is known of separation at a time [s]."""
         status, body = self._published_state, self._body
         separation = self.parameters.execution.separation
-        n_seen, n_faster = (0, 0) if body is None else (body.n_seen, body.n_faster)
+        n_seen, n_further = (0, 0) if body is None else (body.n_seen, body.n_further)
         return {
             'separation': status.state.name,
             'cause': status.cause,
             'rate [-]': f'{status.rate:.3f}',
             'commitments': self._commitments,
-            'greatest speeds': ''
+            'reach [m]': ''
             if body is None or separation is None
-            else speeds_shown(body, now, separation.rules),
+            else reach_shown(body, now, separation.rules),
             'sights of parts': n_seen,
-            'faster than assumed': f'{n_faster} ({n_faster / max(n_seen, 1):.2%})',
+            'further than assumed': f'{n_further} ({n_further / max(n_seen, 1):.2%})',
         }
 
     def _warn_of_lost(self, now: float) -> None:
@@ -336,15 +338,16 @@ class Reporter:
         self.publish()
 
 
-def speeds_shown(body: BodyMotion, now: float, rules: SeparationRules) -> str:
-    """Return how fast each box is assumed to be at a time [s], and by which words of the rules."""
+def reach_shown(body: BodyMotion, now: float, rules: SeparationRules) -> str:
+    """Return how far each box may get from a time on [s], and by which words of the rules."""
     shown, boxes = [], body.scene.boxes
-    for box, speed in zip(boxes[:MOST_SPEEDS], body_at(body, now, rules).speeds, strict=False):
-        words, stated = governing_speed(rules, box.name)
-        why = words if speed <= stated else f'{words}, was faster'
-        shown.append(f'"{box.name}" {speed:g} m/s ({why})')
+    raised = np.where(now <= body.until, body.raised, 0.0)
+    for box, further in zip(boxes[:MOST_BOXES], raised, strict=False):
+        words, lines = governing_reach(rules, box.name)
+        why = words if further == 0.0 else f'{words}, raised by {100 * further:.0f} cm'
+        shown.append(f'"{box.name}" {lines_shown(lines)} ({why})')
     rest = len(boxes) - len(shown)
-    return ', '.join(shown + ([f'{rest} more'] if rest else []))
+    return '; '.join(shown + ([f'{rest} more'] if rest else []))
 
 
 def summary(
