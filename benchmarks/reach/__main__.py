@@ -18,6 +18,7 @@ out in place of persons.
 
 import argparse
 from collections.abc import Sequence
+import math
 from multiprocessing import get_context
 from pathlib import Path
 import sys
@@ -27,6 +28,7 @@ from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.settings import load_settings
 from rrth_planner.io.skeleton_file import load_skeleton
 from rrth_planner.rehearsal.scenario import Tracker
+from rrth_planner.wearer.skeleton import Skeleton
 from tqdm import tqdm
 
 from benchmarks.reach.making import judged, Making
@@ -83,9 +85,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     files = sorted(options.folder.glob('*.bvh'))
     people = persons_of(files)
-    n_steps = round((options.longest or longest_time()) * FRAMES)
+    n_steps = math.ceil((options.longest or longest_time()) * FRAMES)
     items = [
-        (file, people[file], rate, n_steps, load_skeleton(skeleton_name(file)))
+        (file, people[file], rate, n_steps, _skeleton(file, options.hands))
         for file in files
         for rate in RATES
     ]
@@ -118,6 +120,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
+def _skeleton(file: Path, hands: float) -> Skeleton:
+    return load_skeleton(skeleton_name(file), hand_size=hands)
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog='python -m benchmarks.reach', description=(__doc__ or '').strip().splitlines()[0]
@@ -127,6 +133,7 @@ def _parser() -> argparse.ArgumentParser:
     add('--made-of', type=float, nargs='+', default=(1.0,), help='rates of people (%(default)s)')
     add('--limit', type=float, default=LIMIT, help='frames with a part out (%(default)s) [-]')
     add('--longest', type=float, help='time between frames (keep_lost and a stop) [s]')
+    add('--hands', type=float, default=0.0, help='edge of their boxes (as in the skeleton) [m]')
     add('--jobs', type=int, default=1, help='processes (%(default)s)')
     return parser
 

@@ -13,7 +13,7 @@ from rrth_planner.model.arrays import Array
 # c and w of each line [m, m/s].
 Lines = tuple[tuple[float, float], ...]
 # Lines that are not through the origin, at most.
-N_LINES = 2
+N_LINES = 3
 # How much is grown counts from one frame to there: where most running motions have ended [s].
 COUNTED = 0.6
 # Lines are rounded up to multiples of [m], [m/s], and made steeper in steps of [m/s].
@@ -38,7 +38,7 @@ def mean_growth(lines: Lines, times: Array) -> float:
 
 def lines_above(times: Array, bound: Array, least_speed: float = 0.0) -> Lines:
     """
-    Return lines that are nowhere below a bound, with the least mean growth.
+    Return lines that are nowhere below a bound, rounded up, with the least mean growth.
 
     One is through the origin: a box does not grow at once. The others are edges of the upper hull
     of the bound.
@@ -54,13 +54,14 @@ def lines_above(times: Array, bound: Array, least_speed: float = 0.0) -> Lines:
     steepest = max(float((bound / times).max()), least_speed)
     edges = _edges(times, bound)
     speeds = sorted({least_speed, *(w for w in edges if w > least_speed)})
-    found = [(max(0.0, float((bound - w * times).max())), w) for w in speeds]
+    found = [(float((bound - w * times).max()), w) for w in speeds]
+    found = [(c, w) for c, w in found if c > ORIGIN]
     choices = [
-        ((0.0, steepest), *some)
+        ((ORIGIN, steepest), *some)
         for some in combinations_with_replacement(sorted(found), min(N_LINES, len(found)))
     ]
     best = min(choices, key=lambda lines: mean_growth(lines, times))
-    return tuple(dict.fromkeys(line for line in best))
+    return tuple(dict.fromkeys((_up(c, ROUND_C), _up(w, ROUND_W)) for c, w in best))
 
 
 def _edges(times: Array, bound: Array) -> list[float]:
@@ -78,11 +79,9 @@ def _edges(times: Array, bound: Array) -> list[float]:
 
 
 def steepened(lines: Lines, more: float) -> Lines:
-    """Return lines for who may be faster [m/s], rounded up."""
+    """Return lines for who may be faster, by a multiple of `STEP` [m/s]."""
     return tuple(
-        (c, _up(w * STEEPER, ROUND_W))
-        if c == ORIGIN
-        else (_up(c, ROUND_C), _up(w + more, ROUND_W))
+        (c, _up(w * STEEPER, ROUND_W) if c == ORIGIN else round(w + more, 3))
         for c, w in sorted(lines)
     )
 
@@ -94,7 +93,7 @@ def needed(out: Array, lines: Lines, times: Array, error: float) -> Array:
     out (n_times, n): how far it got out of where it was [m]; NaN: not known. Infinite where it is
     further than the line through the origin.
     """
-    origin = STEEPER * dict(lines)[ORIGIN] * times[:, None]
+    origin = dict(steepened(lines, 0.0))[ORIGIN] * times[:, None]
     others = [line for line in lines if line[0] != ORIGIN]
     bound = growth(tuple(others), times)[:, None] if others else origin
     excess = np.where(np.isfinite(out), out - error, -np.inf)

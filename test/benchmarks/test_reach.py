@@ -106,7 +106,7 @@ def test_lines_are_above_what_they_are_drawn_above(seed, least_speed):
     if others:
         bound = np.minimum(STEEPER * lines[0][1] * TIMES, growth(others, TIMES) + 0.3 * TIMES)
         assert (growth(more, TIMES) >= bound - 1e-9).all()
-    # Each is rounded up by less than a step.
+    # Only what grows at once is steeper by a share.
     for (c, w), (d, u) in zip(sorted(lines), more, strict=True):
         assert 0.0 <= d - c < 0.01 + 1e-9
         assert -1e-5 <= u - (STEEPER * w if c == 0.0 else w + 0.3) < 0.05 + 1e-9
