@@ -261,7 +261,7 @@ class Reach(Frozen):
 
 
 # The same names come with each body.
-@functools.lru_cache(maxsize=16)
+@functools.lru_cache(maxsize=64)
 def reach_of(names: tuple[str, ...], rules: SeparationRules) -> Reach:
     """Return how far the boxes of some names may get."""
     found = [governing_reach(rules, name)[1] for name in names]

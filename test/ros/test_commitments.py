@@ -31,6 +31,7 @@ from rrth_planner.execution.flight_recorder import (  # noqa: E402
     read_flight,
     replay,
 )
+from rrth_planner.execution.kept_sights import KeptSights  # noqa: E402
 from rrth_planner.execution.separation_status import SeparationState  # noqa: E402
 from rrth_planner.execution.tracked_motion import forget_command  # noqa: E402
 from rrth_planner.execution.watch import MonitorState, MOST_IGNORED  # noqa: E402
@@ -828,6 +829,22 @@ def test_a_part_is_compared_with_the_body_that_the_running_motion_was_proven_wit
     assert len(arm.published) == 1
     assert noticed[-1] > 0
     assert noticed.index(1) * FRAME > 0.9
+
+
+def test_a_motion_that_was_proven_with_a_body_that_is_kept_no_more_is_proven_anew(separated):
+    arm = separated()
+    arm.frames(20)
+    known = arm.monitor.watch.commitments
+    assert known.is_whole
+    assert known.sent.seen < known.came
+    body = replace(known.body, kept=KeptSights())
+    know(arm.monitor, commitments=replace(known, body=body))
+    arm.frames(1)
+    after = arm.monitor.watch.commitments
+    assert after.is_whole
+    assert not after.is_news
+    assert after.sent.seen == after.came > known.came
+    assert len(arm.published) == 1
 
 
 def test_where_commitments_take_longer_to_find_they_begin_later(separated):
