@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Separation from a wearer who moves: what is assumed of him, and where his parts may be."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 import functools
 import re
@@ -156,7 +156,7 @@ _BORDERS = re.compile(r'(?<=[a-z])(?=[A-Z])|(?<=\d)(?=\D)|(?<=\D)(?=\d)|[\s_-]')
 
 def speed_bound(rules: SeparationRules, name: str) -> float:
     """Return the greatest speed that is stated of a part of the body, by its name [m/s]."""
-    return max(speed for _, speed in _counting(rules.body_speeds, name, lambda v: v == 0.0))
+    return max(speed for _, speed in _counting(rules, rules.body_speeds, name))
 
 
 # The same names come with each body.
@@ -167,20 +167,17 @@ def governing_reach(rules: SeparationRules, name: str) -> tuple[str, Lines]:
 
     A name is read for the worse. Words fit it where they are whole words of it, one after the
     other: spaces, underscores, hyphens, digits and the capitals of LeftUpperArm separate words,
-    capitals count as small letters. What does not move at all fits only a name that has no other
-    word. Where no words fit, what is said of any other part counts; words that merely occur in a
-    name make it get further, never less far. Of all that count none is exceeded. Nothing fits a
-    name with a slash, as `torso/0` of a marker without a text, nor one that was cut short.
+    capitals count as small letters. What wears the arm, by a greatest speed of 0, fits only a name
+    that has no other word. Where no words fit, what is said of any other part counts; words that
+    merely occur in a name make it get further, never less far. Of all that count none is exceeded.
+    Nothing fits a name with a slash, as `torso/0` of a marker without a text, nor one that was cut
+    short.
     """
-    counted = _counting(_entries(rules), name, _stands_still)
+    counted = _counting(rules, _entries(rules), name)
     lines = functools.reduce(joined, (lines for _, lines in counted))
     # One that says it all is named alone.
     alone = [words for words, own in counted if own == lines][:1]
     return ', '.join(alone or [words for words, _ in counted]), lines
-
-
-def _stands_still(lines: Lines) -> bool:
-    return lines == ((0.0, 0.0),)
 
 
 @functools.lru_cache(maxsize=64)
@@ -192,8 +189,16 @@ def _entries(rules: SeparationRules) -> tuple[tuple[str, Lines], ...]:
     return (*reach, *speeds)
 
 
+@functools.lru_cache(maxsize=64)
+def _worn_words(rules: SeparationRules) -> tuple[list[str], ...]:
+    """Return the words of what wears the arm: whatever else has them need not stand still."""
+    still = [words for words, speed in rules.body_speeds if speed == 0.0]
+    still += [words for words, lines in rules.reach if least_lines(lines) == ((0.0, 0.0),)]
+    return tuple(_words(words) for words in still)
+
+
 def _counting(
-    entries: Sequence[tuple[str, _Said]], name: str, stands_still: Callable[[_Said], bool]
+    rules: SeparationRules, entries: Sequence[tuple[str, _Said]], name: str
 ) -> list[tuple[str, _Said]]:
     """Return the entries that count for a name, as `governing_reach` reads it."""
     text = _INDEX.sub('', name)
@@ -204,7 +209,8 @@ def _counting(
         entry = _words(words)
         if entry and ''.join(entry) in ''.join(given):
             counted.append((words, said))
-            does_fit |= whole == entry or (not stands_still(said) and _is_within(entry, whole))
+            is_worn = entry in _worn_words(rules)
+            does_fit |= whole == entry or (not is_worn and _is_within(entry, whole))
     if not does_fit:
         counted += [(ANY_OTHER, said) for words, said in entries if not _words(words)]
     return counted
@@ -261,7 +267,7 @@ class Reach(Frozen):
 
 
 # The same names come with each body.
-@functools.lru_cache(maxsize=16)
+@functools.lru_cache(maxsize=64)
 def reach_of(names: tuple[str, ...], rules: SeparationRules) -> Reach:
     """Return how far the boxes of some names may get."""
     found = [governing_reach(rules, name)[1] for name in names]

@@ -20,8 +20,9 @@ from rrth_planner.collision.reference_checker import (
 from rrth_planner.collision.separation_checker import SAMPLING_PERIOD
 from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.arm import ArmModel, bars_of, Capsule
+from rrth_planner.model.body_reach import BODY_REACH
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.separation import growth_at, seen_body, SeparationRules
+from rrth_planner.model.separation import growth_at, Reach, seen_body, SeparationRules
 from rrth_planner.model.trajectory import sample, Trajectory
 from sample_motions import any_motion, motion_of
 from worlds import capsule_arm, random_boxes, random_chain, table_1_arm
@@ -35,6 +36,12 @@ def first_violation(request):
     """Give the second checker by each library."""
     pytest.importorskip(request.param)
     return partial(separation_checker.first_separation_violation, library=request.param)
+
+
+def slowed(body, share):
+    """Return a wearer whose parts get a share as far."""
+    lines = (body.reach.offsets, body.reach.speeds, body.reach.stated)
+    return replace(body, reach=Reach(*(share * numbers for numbers in lines)))
 
 
 def random_state(rng, arm, n):
@@ -128,7 +135,7 @@ def cases(contact_speed):
         scene = (load_body(), random_boxes(rng, 4))[i % 2]
         body = seen_body(scene, rng.uniform(0.0, 0.1, len(scene.boxes)), rules)
         # Those that see a wearer of full speed for seconds all violate.
-        body = replace(body, speeds=rng.choice([0.0, 0.05, 1.0]) * body.speeds)
+        body = slowed(body, rng.choice([0.0, 0.05, 1.0]))
         motion = motion_of(rng, arm)
         every = separation_violations(arm, body, motion, rules, MARGIN, period=SAMPLING_PERIOD)
         times = [violation.time for violation in every]
@@ -175,7 +182,7 @@ def least_cases(contact_speed):
     rng, arm, found = np.random.default_rng(4), table_1_arm(0.02), []
     rules = replace(RULES, contact_speed=contact_speed, body_error=0.0)
     body = seen_body(load_body(), 0.02, rules)
-    body = replace(body, speeds=0.0 * body.speeds)
+    body = slowed(body, 0.0)
     while len(found) < 3:
         motion = any_motion(rng)
         times = np.append(np.arange(0.0, motion.duration, SAMPLING_PERIOD), motion.duration)
@@ -247,7 +254,8 @@ def check_planted(first_violation, scene_at, motion, rules, ages):
 
 def test_a_hand_above_that_the_arm_meets_at_the_end_of_its_motion(first_violation):
     # So much nearer than it was seen the hand may be at the end.
-    growth = MARGIN + 0.01 + 2.0 * (0.4 + 0.01 + 0.05)
+    lines = dict(BODY_REACH)['hand']
+    growth = MARGIN + 0.01 + min(c + w * (0.4 + 0.01 + 0.05) for c, w in lines)
 
     def above(gap):
         return box_at((0.0, 0.0, RADIUS + growth + gap + 0.1), (2.0, 2.0, 0.2))

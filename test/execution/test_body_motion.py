@@ -161,6 +161,16 @@ def test_lines_belong_to_words_as_speeds_do_and_all_that_count_are_bounded(name,
     assert governing_reach(rules, name) == (words, lines)
 
 
+def test_what_wears_the_arm_fits_its_own_name_only_also_where_its_box_changes_a_little():
+    lines = ((0.0, 0.7), (0.03, 0.15))
+    rules = SeparationRules(body_reach=(*BODY_REACH, ('torso', lines)))
+    assert governing_reach(rules, 'torso') == ('torso', lines)
+    for name in ('rucksack on torso', 'torso strap', 'torso/0'):
+        words, found = governing_reach(rules, name)
+        assert words == ANY_OTHER
+        assert found == dict(BODY_REACH)['']
+
+
 def test_speeds_of_ones_own_count_alone_unless_there_are_lines_of_ones_own():
     speeds = (('hand', 3.0), ('', 2.0))
     assert governing_reach(RULES, 'hand')[1] == dict(BODY_REACH)['hand']

@@ -26,10 +26,12 @@ from rrth_planner.execution.decide import IN_THE_WAY  # noqa: E402
 from rrth_planner.execution.executing_motion import ExecutingMotion, MAX_DEVIATION  # noqa: E402
 from rrth_planner.execution.flight_recorder import (  # noqa: E402
     FlightRecorder,
+    FORMAT,
     MAGIC,
     read_flight,
     replay,
 )
+from rrth_planner.execution.kept_sights import KeptSights  # noqa: E402
 from rrth_planner.execution.separation_status import SeparationState  # noqa: E402
 from rrth_planner.execution.tracked_motion import forget_command  # noqa: E402
 from rrth_planner.execution.watch import MonitorState, MOST_IGNORED  # noqa: E402
@@ -814,6 +816,37 @@ def test_where_a_part_gets_further_than_assumed_the_whole_rest_is_taken_back(sep
     assert arm.statuses[-1].state is not SeparationState.NORMAL
 
 
+def test_a_part_is_compared_with_the_body_that_the_running_motion_was_proven_with(separated):
+    # At this speed it leaves what is assumed of it only after a second.
+    hand, speed = Box('hand', [3.0, -1.0, 0.0], [0.1] * 3, np.eye(3)), 1.2
+    arm, noticed = separated(), []
+    arm.see(hand)
+    arm.begin()
+    begin = arm.now
+    for _ in range(140):
+        arm.frames(1, replace(hand, center=hand.center + [0.0, speed * (arm.now - begin), 0.0]))
+        noticed.append(arm.monitor.watch.commitments.body.n_further)
+    assert len(arm.published) == 1
+    assert noticed[-1] > 0
+    assert noticed.index(1) * FRAME > 0.9
+
+
+def test_a_motion_that_was_proven_with_a_body_that_is_kept_no_more_is_proven_anew(separated):
+    arm = separated()
+    arm.frames(20)
+    known = arm.monitor.watch.commitments
+    assert known.is_whole
+    assert known.sent.seen < known.came
+    body = replace(known.body, kept=KeptSights())
+    know(arm.monitor, commitments=replace(known, body=body))
+    arm.frames(1)
+    after = arm.monitor.watch.commitments
+    assert after.is_whole
+    assert not after.is_news
+    assert after.sent.seen == after.came > known.came
+    assert len(arm.published) == 1
+
+
 def test_where_commitments_take_longer_to_find_they_begin_later(separated):
     arm, hand, ahead = separated(), near(0.3), []
     arm.see(hand)
@@ -1074,6 +1107,7 @@ def test_a_replay_says_at_which_event_another_command_is_given(separated):
 def test_only_values_of_this_package_are_read():
     for content, sentence in (
         (b'', 'another file'),
+        (MAGIC.replace(FORMAT, b'1') + pickle.dumps(len), 'format 1, expected 2'),
         (MAGIC + pickle.dumps(len), 'builtins.len, expected values of this package'),
         (MAGIC + b'\x80', 'damaged'),
         (MAGIC + pickle.dumps(([], pickle.dumps(3), [])), 'no watch'),

@@ -14,7 +14,9 @@ from rclpy.parameter import Parameter  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.io.resources import resource_path  # noqa: E402
 from rrth_planner.io.text_file import load_yaml
+from rrth_planner.model.body_reach import BODY_REACH  # noqa: E402
 from rrth_planner.model.errors import ModelError, OptionsError  # noqa: E402
+from rrth_planner.model.separation import governing_reach  # noqa: E402
 from rrth_planner.planning.options import RRTHOptions  # noqa: E402
 from rrth_planner.ros.interface.parameters import (  # noqa: E402
     current_parameters,
@@ -90,6 +92,22 @@ def test_stops_have_the_limits_of_motions_or_greater_ones(started):
     assert parameters.limits.acceleration.tolist() == [4.0] * 4
 
 
+def test_parts_get_as_far_as_speeds_of_ones_own_take_them_or_lines_of_ones_own(started):
+    def lines(name, **values):
+        _, parameters = started(**values)
+        return governing_reach(parameters.execution.separation.rules, name)[1]
+
+    assert lines('hand', separation='true') == dict(BODY_REACH)['hand']
+    speeds = {'separation': 'true', 'body_speeds': ['hand: 3', ': 1.5']}
+    assert lines('hand', **speeds) == ((0.0, 3.0),)
+    assert lines('foot', **speeds) == ((0.0, 1.5),)
+    reach = {**speeds, 'body_reach': ['hand: 4t, .2 + 1 t']}
+    assert lines('left hand', **reach) == ((0.0, 4.0), (0.2, 1.0))
+    assert lines('foot', **reach) == ((0.0, 1.5),)
+    # Without any lines the speeds count alone.
+    assert lines('hand', separation='true', body_reach=['']) == ((0.0, 2.0),)
+
+
 def test_a_change_is_there_for_the_next_plan(started):
     node, before = started()
     assert node.set_parameters([Parameter(name='margin', value=0.05)])[0].successful
@@ -121,6 +139,25 @@ def test_pairs_that_are_allowed_no_more_may_not_meet():
         ('stop_jerk', [-1.0], 'stop_jerk: [-1.0], expected 4 values, or one for all joints, 0 or'),
         ('stop_acceleration', [1.0, 2.0], 'stop_acceleration: [1.0, 2.0], expected 4 values'),
         ('stop_acceleration', [NAN], 'stop_acceleration: [nan], expected finite'),
+        (
+            'body_speeds',
+            ['hand: fast', ': 2'],
+            'body_speeds: "hand: fast", expected words',
+        ),
+        ('body_speeds', ['hand: 2'], 'body_speeds: none for any other part of the body'),
+        (
+            'body_reach',
+            ['hand'],
+            'body_reach: "hand", expected words of a name and lines',
+        ),
+        ('body_reach', ['hand: 2'], 'body_reach: "hand: 2", expected words of a name and lines'),
+        ('body_reach', ['hand: 2 t, 1 - 2 t'], 'body_reach: "hand: 2 t, 1 - 2 t", expected words'),
+        ('body_reach', ['hand: 1 + 2 t'], '"hand: 1 + 2 t", expected one of its lines without c'),
+        (
+            'body_reach',
+            ['hand: 2 t, 11 + 1 t'],
+            '"c + w t" with c from 0 to 10 [m]',
+        ),
         ('algorithm', 'prm', 'algorithm: "prm", expected one that is available: rrt_h, rrt,'),
         ('second_checker', 'bullet', 'second_checker: "bullet", expected fcl or coal'),
         ('time_limit', 'soon', 'Wrong parameter type'),
