@@ -74,8 +74,10 @@ def default_of(making: Making) -> list[str]:
     """Return the lines of all kinds, as source; what is not recorded is what it is part of."""
     lines = making.lines
     text = ['BODY_REACH = (']
-    for words, _ in STATED.body_speeds:
-        found = lines.get(words, lines.get(SAME_AS.get(words, ''), lines['']))
+    for words, speed in STATED.body_speeds:
+        # Where what wears the arm does not move in a recording, it does not move.
+        unknown = lines[''] if speed > 0.0 else ((0.0, 0.0),)
+        found = lines.get(words, lines.get(SAME_AS.get(words, ' '), unknown))
         text.append(f'    ({words!r}, ({", ".join(map(str, found))},)),')
     return [*text, ')']
 
@@ -84,6 +86,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Make lines, judge people, and print tables."""
     options = _parser().parse_args(arguments)
     files = sorted(options.folder.glob('*.bvh'))
+    if len(files) < 2:
+        print(f'{options.folder}: {len(files)} recordings, expected two or more', file=sys.stderr)
+        return 2
     people = persons_of(files)
     n_steps = math.ceil((options.longest or longest_time()) * FRAMES)
     items = [

@@ -16,6 +16,7 @@ from benchmarks.reach.lines import (
     lines_above,
     needed,
     ORIGIN,
+    ROUND_W,
     steepened,
 )
 from benchmarks.reach.people import FRAMES, kind_of, STATED, Take
@@ -56,9 +57,11 @@ class Making:
 
     @cached_property
     def kinds(self) -> tuple[str, ...]:
-        """The kinds of parts, in the order of their stated speeds."""
+        """The kinds of parts that move, in the order of their stated speeds."""
         found = {kind_of(part) for take in self.takes for part in take.out}
-        return tuple(word for word, _ in STATED.body_speeds if word in found)
+        return tuple(
+            word for word, _ in STATED.body_speeds if word in found and self.people_of(word)
+        )
 
     def unit_of(self, kind: str, take: Take) -> str:
         """Return what is left out together: a person, or a take where there is one person."""
@@ -89,7 +92,10 @@ class Making:
     def base_lines(self, kind: str, without: str = '') -> Lines:
         """Return lines above all units but one, as steep as these need."""
         bounds = [x for (k, unit), x in self._covered.items() if k == kind and unit != without]
-        bound, speed = np.max(bounds, axis=0), dict(STATED.body_speeds)[kind]
+        speed = dict(STATED.body_speeds)[kind]
+        if not bounds:
+            return ((ORIGIN, max(speed, ROUND_W)),)
+        bound = np.max(bounds, axis=0)
         if kind in LEGS:
             return lines_above(self.times, bound, speed)
         floor = np.minimum(speed * self.times, bound.max())

@@ -2,16 +2,25 @@
 # SPDX-License-Identifier: Apache-2.0
 """How far parts get is measured as it should be, and lines are above it."""
 
+import ast
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 pytest.importorskip('tqdm')
 
+from benchmarks.reach.__main__ import default_of, longest_time, main, table_of
 from benchmarks.reach.containment import containment, corners_of, reaches, ways
 from benchmarks.reach.lines import growth, least_steps, lines_above, needed, steepened, STEEPER
 from benchmarks.reach.making import judged, Making
-from benchmarks.reach.people import FRAMES, STATED, Take
+from benchmarks.reach.people import FRAMES, measured, persons_of, STATED, Take
 from hypothesis import given, strategies as st
+from rrth_planner.io.motion_capture_file import load_person
+from rrth_planner.io.person_file import write_person
+from rrth_planner.io.skeleton_file import load_skeleton
+from rrth_planner.wearer.recorded_person import excerpt
+from worlds import examples
 
 TIMES = np.arange(1, 61) / FRAMES
 
@@ -34,13 +43,14 @@ def random_row(rng):
     return row(rng.uniform(-0.3, 0.3, 3), rng.uniform(0.02, 0.5, 3), rotation)
 
 
-def distance(point, box):
-    """Return how far a point is from a box, by its nearest point in it."""
+def furthest(points, box):
+    """Return how far the furthest of points is from a box, by their nearest points in it."""
     R, half = box[6:].reshape(3, 3), box[3:6] / 2
-    nearest = box[:3] + R @ np.clip(R.T @ (point - box[:3]), -half, half)
-    return np.linalg.norm(point - nearest)
+    nearest = box[:3] + np.clip((points - box[:3]) @ R, -half, half) @ R.T
+    return np.linalg.norm(points - nearest, axis=1).max()
 
 
+@examples(100)
 @given(st.integers(0, 2**32 - 1))
 def test_a_box_holds_another_one_once_it_is_grown_by_the_containment_and_not_before(seed):
     rng = np.random.default_rng(seed)
@@ -48,9 +58,8 @@ def test_a_box_holds_another_one_once_it_is_grown_by_the_containment_and_not_bef
     found = containment(before[None], after[None])[0]
     share = rng.uniform(-0.5, 0.5, (2000, 3))
     inside = after[:3] + (share * after[3:6]) @ after[6:].reshape(3, 3).T
-    furthest = max(distance(point, before) for point in inside)
-    assert furthest <= found + 1e-12
-    corner = max(distance(point, before) for point in corners_of(after[None])[:, :, 0].T)
+    assert furthest(inside, before) <= found + 1e-12
+    corner = furthest(corners_of(after[None])[:, :, 0].T, before)
     assert found == pytest.approx(corner, abs=1e-12)
     assert found <= ways(before[None], after[None])[0] + 1e-12
 
@@ -93,6 +102,7 @@ def test_reaches_compare_each_two_frames_both_ways():
             assert gone[m - 1, k] == pytest.approx(ways(*pair)[0], abs=1e-6)
 
 
+@examples(60)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 1.0]))
 def test_lines_are_above_what_they_are_drawn_above(seed, least_speed):
     rng = np.random.default_rng(seed)
@@ -182,3 +192,37 @@ def test_of_one_person_takes_are_left_out():
     assert making.people_of('hand') == ('a',)
     assert making.unit_of('hand', takes[1]) == 'two'
     assert making.steps['hand'] > 0.0
+
+
+def test_a_person_is_known_by_his_bones_and_his_table_is_source(tmp_path):
+    person = load_person()
+    taller = replace(person, positions=1.05 * person.positions)
+    files = [tmp_path / f'{name}.csv' for name in ('one', 'another', 'same')]
+    for file, who, begin in zip(files, (person, taller, person), (0.0, 0.0, 4.0), strict=True):
+        write_person(excerpt(who, begin, begin + 3.0), file, ['A test.'])
+    people = persons_of(files)
+    assert people[files[0]] == people[files[2]] != people[files[1]]
+    skeleton = load_skeleton('cmu_bvh')
+    takes = [measured((file, people[file], 1.0, 20, skeleton)) for file in files]
+    assert all(take.n_frames == int(2.9 * FRAMES) for take in takes)
+    making = Making(takes, (1.0,), 0.01)
+    assert making.people_of('hand') == ('person 1', 'person 2')
+    text = default_of(making)
+    found = dict(ast.literal_eval(''.join(text).removeprefix('BODY_REACH = ')))
+    assert list(found) == [words for words, _ in STATED.body_speeds]
+    assert found['hand'] == making.lines['hand']
+    assert found['chest'] == found['torso']
+    rows = [line.split('|')[1:-1] for line in table_of(making)]
+    assert len({len(row) for row in rows}) == 1
+    for row in rows[2:]:
+        assert float(row[-1].split('/')[1]) <= 1.0
+
+
+def test_fewer_than_two_recordings_are_one_sentence(tmp_path, capsys):
+    assert main([str(tmp_path)]) == 2
+    assert 'expected two or more' in capsys.readouterr().err
+
+
+def test_the_longest_time_is_that_of_a_lost_part_and_a_stop_from_full_acceleration():
+    # 1.5 rad/s, 4 rad/s^2, 40 rad/s^3: 2 + 1.5 / 4 + 2 * 4 / 40.
+    assert longest_time() == pytest.approx(2.575)

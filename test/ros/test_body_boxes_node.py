@@ -294,6 +294,15 @@ def test_a_tracker_of_each_kind_becomes_the_boxes_of_the_core(name, source, star
     expect(tracker.hear(other, NOW + STEP), tracker.skeleton, other)
 
 
+def test_hands_have_the_size_that_is_said(start):
+    tracker = start('mediapipe', 'poses', hand_size=0.2)
+    posture = person_of('mediapipe')
+    msg = tracker.hear(posture, NOW + 123)
+    expect(msg, load_skeleton('mediapipe', hand_size=0.2), posture)
+    sizes = {m.text: [m.scale.x, m.scale.y, m.scale.z] for m in msg.markers}
+    np.testing.assert_allclose([sizes['left hand'], sizes['right hand']], 0.2, atol=1e-9)
+
+
 def test_joint_states_of_a_person_with_a_urdf_become_boxes(start):
     yourdfpy = pytest.importorskip('yourdfpy')
     tracker = start('ros4hri', 'joint_states')

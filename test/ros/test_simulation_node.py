@@ -199,11 +199,15 @@ def test_an_arm_that_runs_into_the_wearer_reports_that(started, tmp_path):
     )
 
 
-def test_a_recorded_child_is_in_the_scene_where_the_stature_says_so(started, tmp_path):
+def test_a_recorded_child_is_in_the_scene_where_the_stature_says_so_with_hands_of_a_size(
+    started, tmp_path
+):
     file = str(write_child(tmp_path / 'child.csv'))
     with pytest.raises(SceneError, match='smaller than the parameter stature says'):
         started(wearer='recorded', wearer_file=file)
-    started(wearer='recorded', wearer_file=file, stature=[1.2])
+    with pytest.raises(SceneError, match=r'hand_size: 0.02, expected 0 or a size from 0.05 to 1'):
+        started(wearer='recorded', wearer_file=file, stature=[1.2], hand_size=0.02)
+    started(wearer='recorded', wearer_file=file, stature=[1.2], hand_size=0.2)
 
 
 @pytest.mark.parametrize(

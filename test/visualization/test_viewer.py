@@ -313,6 +313,8 @@ def test_a_child_is_a_wearer_where_the_stature_says_so(tmp_path, capsys):
         # He is taken: only the address is none.
         (['--stature', '1.0', '1.2'], '--host no.such.host.invalid'),
         (['--stature', '1.2'], '--host no.such.host.invalid'),
+        (['--stature', '1.2', '--hand-size', '3'], 'hand_size: 3, expected 0 or a size from 0.05'),
+        (['--stature', '1.2', '--hand-size', '0.2'], '--host no.such.host.invalid'),
     ):
         assert main([*person, *nowhere, *arguments]) == 1
         said = capsys.readouterr().err
