@@ -8,6 +8,7 @@ import pytest
 pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 
+from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rrth_planner.collision import reference_checker, trajectory_validation  # noqa: E402
 from rrth_planner.collision.violation import Violation  # noqa: E402
@@ -18,7 +19,7 @@ from rrth_planner.model.trajectory import positions_at  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of  # noqa: E402
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg  # noqa: E402
 from samples import array, box, fenced, FOLDED, JOINTS, wearer  # noqa: E402
-from stranger import _one_try, _start, inputs_of, say_all  # noqa: E402, F401
+from stranger import _one_try, _start, inputs_of, LATCHED, say_all  # noqa: E402, F401
 
 pytestmark = pytest.mark.usefixtures('ros_context')
 
@@ -70,6 +71,21 @@ def test_an_arm_that_the_wearer_leaned_into_escapes_and_the_answer_says_so(
     np.testing.assert_array_equal(trajectory.positions[0], FOLDED)
     for values in (trajectory.velocities, trajectory.accelerations):
         assert not values[[0, -1]].any()
+
+
+def test_with_separation_an_arm_waits_until_a_hand_is_out_of_its_ray_and_says_so(start):
+    planner, stranger = start(
+        separation=True, time_limit=0.6, body_timeout=30.0, joint_timeout=30.0
+    )
+    stranger.subscribe('rrth_planner/state', DiagnosticStatus, LATCHED)
+    states = stranger.received['rrth_planner/state']
+    say_all(planner, stranger, body_boxes=leaned(0.04))
+    response = stranger.answer()
+    assert response.message.startswith('START_STATE_IN_COLLISION (-10): RAY_BLOCKED: hand/0 is in')
+    waits = 'PROTECTIVE_STOP: the arm waits until hand/0 is out of its pointing ray'
+    stranger.wait_until(lambda: any(msg.message == waits for msg in states))
+    stranger.wait_until(lambda: states[-1].message == 'NORMAL')
+    assert not stranger.received['joint_trajectory']
 
 
 def test_a_hand_that_rests_in_the_ray_of_an_arm_at_rest_is_no_reason_to_stay(start):

@@ -72,6 +72,8 @@ class Reporter:
         self._body_ages = Figures()
         self._n_incidents, self._last_incident = 0, ''
         self._separation, self._commitments = SeparationStatus(), Figures()
+        # What is in the pointing ray of an arm that waits to begin; empty: nothing.
+        self._box_in_ray = ''
         self._body: BodyMotion | None = None
         self._state: Publisher | None = None
         self._published_state, self._published_trouble = self._separation, self._unfollowed
@@ -136,7 +138,11 @@ class Reporter:
         is_known = self._inputs.source.time_until_known(time.monotonic()) <= 0.0
         if self.parameters.stands_still and is_known:
             return SeparationStatus(SeparationState.UNSEPARATED, NO_PROMISE)
-        return self._separation
+        box = self._box_in_ray
+        if not box or self._separation.state is SeparationState.FAULT:
+            return self._separation
+        cause = f'the arm waits until {box} is out of its pointing ray'
+        return SeparationStatus(SeparationState.PROTECTIVE_STOP, cause, 0.0, 'pointing ray', box)
 
     def _publish_changed_state(self) -> None:
         status, before = self._shown_state, self._published_state
@@ -180,11 +186,8 @@ class Reporter:
 
     def ray_blocked_by(self, box: str) -> None:
         """Publish what an arm at rest waits for to leave its pointing ray; empty: nothing."""
-        if self._separation.state is SeparationState.FAULT:
-            return
-        cause = f'the arm waits until {box} is out of its pointing ray'
-        waits = SeparationStatus(SeparationState.PROTECTIVE_STOP, cause, 0.0, 'pointing ray', box)
-        self.separation_status(waits if box else SeparationStatus())
+        self._box_in_ray = box
+        self._publish_changed_state()
 
     def nothing_runs(self) -> None:
         """Publish that no motion is executed, and none will be without a request."""
