@@ -10,7 +10,7 @@ import numpy as np
 from rrth_planner.io.motion_capture_file import load_person
 from rrth_planner.io.skeleton_file import load_skeleton
 from rrth_planner.model.arrays import Array
-from rrth_planner.model.separation import governing_speed, SeparationRules
+from rrth_planner.model.separation import governing_reach, SeparationRules, speed_bound
 from rrth_planner.wearer.body_boxes import rows_of_postures
 from rrth_planner.wearer.joint_positions import joints_of
 from rrth_planner.wearer.recorded_person import postures_at, RecordedPerson
@@ -28,7 +28,7 @@ RIGID = (
     *(('left hip', 'left knee'), ('right hip', 'right knee')),
 )
 SAME = 1e-3
-STATED = SeparationRules()
+STATED = SeparationRules(body_reach=())
 
 
 @dataclass(slots=True, eq=False)
@@ -66,7 +66,7 @@ def skeleton_name(file: Path) -> str:
 
 def kind_of(part: str) -> str:
     """Return the words of the stated speeds that fit a part best, as `hand` for a left one."""
-    return governing_speed(STATED, part)[0]
+    return governing_reach(STATED, part)[0]
 
 
 def persons_of(files: Sequence[Path]) -> dict[Path, str]:
@@ -115,7 +115,7 @@ def measured(item: tuple[Path, str, float, int, Skeleton]) -> Take:
     times = np.arange(1, n_steps + 1)[:, None] / FRAMES
     for k, part in enumerate(skeleton.parts):
         out, gone = reaches(rows[:, k], n_steps)
-        speed = governing_speed(STATED, part.name)[1]
+        speed = speed_bound(STATED, part.name)
         take.out[part.name] = out
         take.n_pairs[part.name] = int(np.isfinite(out).sum())
         with np.errstate(invalid='ignore'):

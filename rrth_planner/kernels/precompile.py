@@ -17,6 +17,7 @@ SHARES = (
         'vectors',
         'kinematics.generated_fk',
         'collision.separation',
+        'collision.containment',
         'kinematics.pan_tilt_ik',
         'search.elastic_band',
         'collision.arm_clearance',

@@ -237,7 +237,7 @@ def test_versions_that_differ_are_named(monkeypatch, capsys):
         (None, 'No such file'),
         ('a: [', 'expected a readable YAML file'),
         ('', 'incident: None, expected a mapping'),
-        ('format: 9', 'format: 9, expected 5'),
+        ('format: 9', 'format: 9, expected 6'),
         ('\x00', 'expected a readable YAML file'),
         ('[' * 900, 'or 20 in one another; expected a readable YAML file'),
     ],

@@ -98,6 +98,7 @@ NAMED = {
 NUMBERS = {
     'arm_validity': {'2': 'ends of an edge', '16': 'two bars of two points of four numbers'},
     'boxes': {'3': 'coordinates', '1': 'the part that is all boxes'},
+    'containment': {'3': 'coordinates', '9': 'a rotation'},
     'clock': {'2': 'seconds and nanoseconds'},
     'bar_bar': {'3': 'coordinates'},
     'bar_box': {'3': 'coordinates'},
