@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One arm beside hands that reach for it, with everything going wrong that the wire allows."""
 
+from dataclasses import replace
 import math
 
 import numpy as np
@@ -56,7 +57,10 @@ class Episode:
         delay = float(rng.choice([0.01, 0.02]))
         lag = float(rng.choice([0.0, 0.004]))
         case = Case(stop=str(rng.choice(['4/40', '10/400'])), controller_delay=delay)
-        self._separation = separation_of(case)
+        separation = separation_of(case)
+        # Hands go on for as long as they like: what bounds them is their greatest speed.
+        bounded = replace(separation.rules, body_reach=())
+        self._separation = replace(separation, rules=bounded)
         execution = ExecutionRules(self._separation, delay, bool(rng.random() < 0.2))
         rules = PlainRules(
             required=required(),

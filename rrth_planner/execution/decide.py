@@ -545,6 +545,7 @@ def _phase(watch: Watch, at: Moment) -> tuple[Decision, float | None]:
     # An arm that stops sharply goes on from rest only: another way is looked for sooner.
     is_stuck = (
         is_monitoring
+        and watch.rules.replan
         and given.stops_sharply(known)
         and is_over(watch.tracked, at.reading, at.now, SHARP_GRACE)
         and not given.is_arrived(known, at.now)
