@@ -105,6 +105,7 @@ class Episode:
         world.hidden = frozenset()
         world.stands_until = world.fails_until = world.blind_until = -math.inf
         world.rejects_until = -math.inf
+        world.wire = replace(world.wire, loss=0.0, hesitating=0.0)
         # The hand goes away, and what was moving comes to rest.
         world.timeline.run(BEGIN + CHAOS + CALM)
         self._judge_end()

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from rcl_interfaces.msg import SetParametersResult
@@ -34,6 +34,7 @@ from rrth_planner.planning.options import ALGORITHMS
 from rrth_planner.ros.messages.body_source import BodySource
 from rrth_planner.ros.middleware.parameter_declaration import ARM, declare, reject_unknown, Setting
 
+T = TypeVar('T')
 # The options of all algorithms by name; the same name means the same in each.
 OPTIONS = {f.name: f for kind in ALGORITHMS.values() for f in fields(kind)}
 STOP_LIMITS = {'stop_acceleration': 'rad/s^2', 'stop_jerk': 'rad/s^3'}
@@ -300,37 +301,33 @@ def _stop_limits(values: Mapping[str, Any], limits: MotionLimits) -> MotionLimit
     )
 
 
+def _entries(
+    name: str, entries: Sequence[str], read: Callable[[str], T], expected: str
+) -> tuple[tuple[str, T], ...]:
+    """Return the words of the entries of a parameter, `words: ...`, and what is read behind."""
+    found = []
+    for entry in entries:
+        words, colon, text = entry.rpartition(':')
+        try:
+            if not colon:
+                raise ValueError(text)
+            found.append((words.strip(), read(text)))
+        except ValueError:
+            raise OptionsError(f'{name}: "{entry}", expected {expected}') from None
+    return tuple(found)
+
+
 def _separation_rules(values: Mapping[str, Any]) -> SeparationRules:
     """Return the rules that parameters describe; also where they are not used."""
-    reach, speeds = [], []
-    for entry in values['body_reach'] or ():
-        words, colon, text = entry.rpartition(':')
-        if not colon and not text.strip():
-            continue
-        try:
-            reach.append((words.strip(), lines_of_text(text)))
-        except ValueError:
-            colon = ''
-        if not colon:
-            raise OptionsError(
-                f'body_reach: "{entry}", expected words of a name and lines, as "hand: 3.6 t, '
-                '0.21 + 1.45 t" [m, m/s]'
-            )
-    for entry in values['body_speeds'] or ():
-        words, colon, speed = entry.rpartition(':')
-        try:
-            speeds.append((words.strip(), float(speed)))
-        except ValueError:
-            colon = ''
-        if not colon:
-            raise OptionsError(
-                f'body_speeds: "{entry}", expected words of a name and a speed, as "upper arm: '
-                '1.6" [m/s]'
-            )
+    given = [entry for entry in values['body_reach'] or () if entry.strip()]
+    lines = 'words of a name and lines, as "hand: 3.6 t, 0.21 + 1.45 t" [m, m/s]'
+    reach = _entries('body_reach', given, lines_of_text, lines)
+    speed = 'words of a name and a speed, as "upper arm: 1.6" [m/s]'
+    speeds = _entries('body_speeds', values['body_speeds'] or (), float, speed)
     return SeparationRules(
         contact_speed=values['contact_speed'],
-        body_speeds=tuple(speeds),
-        body_reach=None if list(values['body_reach'] or ()) == REACH else tuple(reach),
+        body_speeds=speeds,
+        body_reach=None if list(values['body_reach'] or ()) == REACH else reach,
         body_error=values['body_error'],
         controller_delay=values['controller_delay'],
     )

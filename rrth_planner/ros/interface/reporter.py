@@ -120,10 +120,10 @@ class Reporter:
         """Keep what is known of the wearer, and log which parts got further than assumed."""
         self._body = body
         if body.further:
-            named = ', '.join(f'{one_line(name)} by {100 * x:.0f} cm' for name, x in body.further)
+            named = ', '.join(f'{one_line(name)} by {100 * x:.1f} cm' for name, x in body.further)
             self._node.get_logger().warning(
-                f'further than assumed: {named}; for {RAISED:g} s assumed to get {SHARE:g} '
-                'times that further',
+                f'further than assumed: {named}; for {RAISED:g} s {SHARE:g} times that is added '
+                'to how far it may get',
                 throttle_duration_sec=WARNING_PERIOD,
             )
 

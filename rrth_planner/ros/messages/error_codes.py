@@ -16,7 +16,8 @@ MEANINGS = {
     ErrorCode.TIMED_OUT: 'no path within `time_limit`',
     ErrorCode.PREEMPTED: 'cancelled, or 64 requests wait for their answers already',
     ErrorCode.START_STATE_IN_COLLISION: 'a bar of the arm is `escape_depth` or deeper in a box, '
-    'or no escape of bars and ray is proven: which part of the arm, which box, how deep',
+    'or no escape of bars and ray is proven: which part of the arm, which box, how deep; or '
+    '`RAY_BLOCKED`: a part stays in the pointing ray of an arm at rest',
     ErrorCode.GOAL_IN_COLLISION: 'the target is inside a box, or all goal configurations that '
     'were tried violate the margin: which part of the arm, which box, how deep',
     ErrorCode.INVALID_GOAL_CONSTRAINTS: 'the target of a request is not valid',
