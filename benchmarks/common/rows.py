@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
-from rrth_planner.io.parquet_file import read_table, replace_file, write_table
+from rrth_planner.io.parquet_file import read_table, write_table
+from rrth_planner.io.replaced_file import replace_file
 
 from benchmarks.common.task import Row
 

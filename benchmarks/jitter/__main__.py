@@ -17,7 +17,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
-from rrth_planner.io.parquet_file import replace_file
+from rrth_planner.io.replaced_file import replace_file
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.trajectory import sample, Trajectory

@@ -51,7 +51,7 @@ def main(arguments: Sequence[str] | None = None, find: Callable[[str], object] =
 
 
 def _run(options: argparse.Namespace, command: str) -> None:
-    from rrth_planner.io.parquet_file import replace_file
+    from rrth_planner.io.replaced_file import replace_file
     from rrth_planner.reproduction.statistics import markdown_table
 
     from benchmarks.motions.figures import draw_figures

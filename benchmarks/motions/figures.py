@@ -9,7 +9,7 @@ from typing import Any
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 import numpy as np
-from rrth_planner.io.parquet_file import replace_file
+from rrth_planner.io.replaced_file import replace_file
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
 
 from benchmarks.common.controller_curve import curve_of, derivative, instants

@@ -8,7 +8,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 import numpy as np
-from rrth_planner.io.parquet_file import replace_file
+from rrth_planner.io.replaced_file import replace_file
 from rrth_planner.model.arrays import Array
 
 from benchmarks.common.queries import MAPS, QUERIES

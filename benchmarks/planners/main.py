@@ -9,7 +9,7 @@ from pathlib import Path
 import platform
 import sys
 
-from rrth_planner.io.parquet_file import replace_file
+from rrth_planner.io.replaced_file import replace_file
 from rrth_planner.model.errors import RrthError
 from rrth_planner.reproduction.run import processor_name
 from rrth_planner.reproduction.statistics import markdown_table

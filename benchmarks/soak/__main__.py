@@ -40,7 +40,7 @@ def main(arguments: Sequence[str] | None = None, find: Callable[[str], object] =
 
 
 def _run(options: argparse.Namespace) -> int:
-    from rrth_planner.io.parquet_file import replace_file
+    from rrth_planner.io.replaced_file import replace_file
 
     from benchmarks.common.processors import OnEachProcessor, stay_awake
     from benchmarks.common.real_time import is_real_time

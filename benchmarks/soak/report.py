@@ -8,7 +8,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 import numpy as np
-from rrth_planner.io.parquet_file import replace_file
+from rrth_planner.io.replaced_file import replace_file
 from rrth_planner.reproduction.statistics import markdown_table
 
 from benchmarks.common.real_time import scheduling

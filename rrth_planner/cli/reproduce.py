@@ -38,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         say('reproduce', str(problem))
         return 2
     from rrth_planner.io.cluster import cluster_client
-    from rrth_planner.io.parquet_file import replace_file
+    from rrth_planner.io.replaced_file import replace_file
     from rrth_planner.reproduction.cluster import run_campaign
     from rrth_planner.reproduction.experiments import spread_runs, timed_runs
     from rrth_planner.reproduction.figures.all import draw_pictures

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from enum import Enum
-import os
 from pathlib import Path
 from types import UnionType
 from typing import Any, get_args, get_origin
@@ -15,6 +14,7 @@ import uuid
 import numpy as np
 from rrth_planner.io.entries import mapping, number, sequence, text, whole
 from rrth_planner.io.incident import Incident, IncidentKind
+from rrth_planner.io.replaced_file import replace_file
 from rrth_planner.io.settings import LENGTHS
 from rrth_planner.io.text_file import load_yaml, naming_file, to_yaml
 from rrth_planner.model.arrays import frozen_array
@@ -63,12 +63,7 @@ def write_record(
     folder.mkdir(parents=True, exist_ok=True)
     stamp = ''.join(c for c in time[:26] if c.isalnum())
     path = folder / f'{kind}-{stamp}-{uuid.uuid4().hex[:6]}{suffix}'
-    fresh = path.with_suffix('.part')
-    try:
-        fresh.write_bytes(content)
-        os.replace(fresh, path)
-    finally:
-        fresh.unlink(missing_ok=True)
+    replace_file(path, lambda fresh: fresh.write_bytes(content))
     with suppress(OSError):
         _remove_oldest(folder, path, f'{kind}-*{suffix}', most)
     return path

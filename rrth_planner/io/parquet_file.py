@@ -9,14 +9,13 @@ all.
 
 # mypy: disable-error-code="import-untyped,import-not-found,no-untyped-call"
 
-from collections.abc import Callable
 import os
 from pathlib import Path
 from typing import Any
-import uuid
 
 import pyarrow as pa
 import pyarrow.parquet as pq
+from rrth_planner.io.replaced_file import replace_file
 from rrth_planner.model.errors import RrthError
 
 # What pyarrow raises for a file that is not what it should be.
@@ -68,15 +67,3 @@ def unreadable(path: Path, problem: Exception, what: str) -> RrthError:
     if isinstance(problem, OSError) and problem.errno is not None:
         why = os.strerror(problem.errno)
     return RrthError(f'file {path}: {why}; expected {what}')
-
-
-def replace_file(path: Path, write: Callable[[Path], object]) -> None:
-    """Have a file written beside its place, then move it there."""
-    fresh = path.with_name(f'.{path.name}.{uuid.uuid4().hex[:8]}')
-    try:
-        write(fresh)
-        with fresh.open('rb') as file:
-            os.fsync(file.fileno())
-        os.replace(fresh, path)
-    finally:
-        fresh.unlink(missing_ok=True)
