@@ -275,8 +275,13 @@ def _checked(watch: Watch, at: Moment, look: Look, phase: float) -> Decision:
     is_free = holds(watch, is_remaining_free, planned, planned_phase, scene) and (
         is_escaping or _is_arm_free(watch, at, scene)
     )
-    # An escape leaves where he is.
-    is_soon_free = is_escaping or holds(watch, is_expected_free, watch.running, phase, expected)
+    # An escape leaves where he is. A commitment ends in a stop: he only keeps it from being longer.
+    has_stop_ahead = watch.commitments.is_active and not watch.commitments.is_whole
+    is_soon_free = (
+        is_escaping
+        or has_stop_ahead
+        or holds(watch, is_expected_free, watch.running, phase, expected)
+    )
     why = IN_THE_WAY if is_soon_free else SOON_IN_THE_WAY
     if is_free and is_soon_free:
         # So far the arm keeps clear of where he will be; so must what it is given next.
