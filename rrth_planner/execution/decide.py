@@ -275,7 +275,7 @@ def _checked(watch: Watch, at: Moment, look: Look, phase: float) -> Decision:
     is_free = holds(watch, is_remaining_free, planned, planned_phase, scene) and (
         is_escaping or _is_arm_free(watch, at, scene)
     )
-    # An escape leaves where he is. A commitment ends in a stop: he only keeps it from being longer.
+    # An escape leaves where he is. A commitment ends in a stop, and is not prolonged into him.
     has_stop_ahead = watch.commitments.is_active and not watch.commitments.is_whole
     is_soon_free = (
         is_escaping

@@ -14,9 +14,9 @@ Lines = tuple[Line, ...]
 # Lines by words of the names of parts, in the frame of the torso: how far a box of a part gets out
 # of where it was seen, in 99.99 % of the pairs of frames 0.1 to 0.6 s apart of CMU motions 62_01,
 # 62_07 and 62_13 (one person at work), a little widened by takes of other people. The first line
-# of each meets the second one about 0.1 s after a sight. Legs are of that person only, the foot is
-# taken for a shin: they are no lower at any time than their greatest speeds in `BODY_SPEEDS`. Any
-# other part (no words) may be any of these.
+# of each meets the second one about 0.1 s after a sight. Legs are of that person only, feet of six
+# takes of him: no lower at any time than their greatest speeds in `BODY_SPEEDS`. Any other part
+# (no words) may be any of these.
 BODY_REACH: tuple[tuple[str, Lines], ...] = (
     ('head', ((0.0, 1.3), (0.1, 0.25))),
     ('neck', ((0.0, 0.5), (0.03, 0.15))),
@@ -26,8 +26,8 @@ BODY_REACH: tuple[tuple[str, Lines], ...] = (
     ('pelvis', ((0.0, 1.2), (0.07, 0.45))),
     ('thigh', ((0.0, 3.0), (0.17, 1.25), (0.23, 1.0))),
     ('shin', ((0.0, 4.7), (0.18, 2.85), (0.38, 2.0))),
-    ('foot', ((0.0, 4.7), (0.18, 2.85), (0.38, 2.0))),
-    ('', ((0.0, 4.7), (0.21, 2.85), (0.42, 2.0))),
+    ('foot', ((0.0, 6.6), (0.26, 3.95), (0.7, 2.0))),
+    ('', ((0.0, 6.6), (0.26, 3.95), (0.7, 2.0))),
 )
 # Reach is known up to so long after a sight: as long as a lost part may be waited for by default,
 # and a stop. Beyond that the greatest speeds count [s].
