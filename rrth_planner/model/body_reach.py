@@ -14,8 +14,8 @@ Lines = tuple[Line, ...]
 # Lines by words of the names of parts, in the frame of the torso: how far a box of a part gets out
 # of where it was seen, in 99.99 % of the pairs of frames 0.1 to 0.6 s apart of CMU motions 62_01,
 # 62_07 and 62_13 (one person at work), a little widened by takes of other people. The first line
-# of each meets the second one about 0.1 s after a sight. Legs are of that person only, feet of six
-# takes of him: no lower at any time than their greatest speeds in `BODY_SPEEDS`. Any other part
+# of each meets the second one about 0.1 s after a sight. Legs are of that person only, shins and
+# feet of six takes of him: no lower at any time than their greatest speeds in `BODY_SPEEDS`. Any other part
 # (no words) may be any of these.
 BODY_REACH: tuple[tuple[str, Lines], ...] = (
     ('head', ((0.0, 1.3), (0.1, 0.25))),
@@ -25,7 +25,7 @@ BODY_REACH: tuple[tuple[str, Lines], ...] = (
     ('hand', ((0.0, 3.6), (0.21, 1.45), (0.42, 0.75))),
     ('pelvis', ((0.0, 1.2), (0.07, 0.45))),
     ('thigh', ((0.0, 3.0), (0.17, 1.25), (0.23, 1.0))),
-    ('shin', ((0.0, 4.7), (0.18, 2.85), (0.38, 2.0))),
+    ('shin', ((0.0, 5.6), (0.26, 3.05), (0.45, 2.0))),
     ('foot', ((0.0, 6.6), (0.26, 3.95), (0.7, 2.0))),
     ('', ((0.0, 6.6), (0.26, 3.95), (0.7, 2.0))),
 )
