@@ -5,6 +5,7 @@
 import argparse
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, ExitStack
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 import math
@@ -35,8 +36,9 @@ from rrth_planner.io.settings import load_settings, PlanSettings
 from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.curves import part
 from rrth_planner.model.errors import RrthError
-from rrth_planner.model.separation import Separation
+from rrth_planner.model.separation import reach_of, SeenBody, Separation
 from rrth_planner.model.trajectory import REST_SPEED
 from rrth_planner.ros.client.planner_client import (
     DemoClient,
@@ -53,6 +55,7 @@ from rrth_planner.ros.messages.message_file import message_from_file
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg
 from rrth_planner.ros.middleware.child_process import ChildProcess
 from rrth_planner.visualization.motion_figure import Motion, motion_figure
+from rrth_planner.visualization.separation_view import Instant, reserves, Span
 from visualization_msgs.msg import MarkerArray
 
 POINTING_TOLERANCE = 1e-3
@@ -174,7 +177,12 @@ def _run(options: argparse.Namespace) -> None:
         beside.append(_sentence_of_contacts(contacts))
     scene = scene_of(WearerBody().apply(body, math.inf, frame))
     figure = motion_figure(
-        arm, scene, motions, settings.limits, settings.ray_guard_length, _rates(client)
+        arm,
+        scene,
+        motions,
+        settings.limits,
+        settings.ray_guard_length,
+        _seen_beside(client, separation, frame),
     )
     figure.savefig(options.output, dpi=DOTS_PER_INCH)
     print('\n' + '\n'.join([HEADER, *lines, *beside]))
@@ -266,10 +274,11 @@ def _sentences(client: DemoClient, separation: Separation, frame: str, error: fl
         for (_, before), (_, status) in pairwise(client.statuses)
     )
     n_targets, share = len(PERSON_TARGETS), 100.0 * found.n_further / found.n_frames
+    least = min(span.rate for span in _spans(client))
     return [
         f'Beside a person at work, with separation: {n_targets} of {n_targets} targets reached '
         f'(the ray misses them by at most {1e3 * error:.3f} mm) with {found.n_commitments} '
-        f'commitments, protective stops: {n_stops}, least rate {_rates(client)[:, 1].min():.2f}. '
+        f'commitments, protective stops: {n_stops}, least rate {least:.2f}. '
         f'In {share:.1f} % of {found.n_frames} frames a part of the body had got further than '
         'assumed.',
         'Each commitment ends at rest and is clear of wherever the person may be (exceptions: '
@@ -294,12 +303,61 @@ def _sentence_of_contacts(messages: Sequence[DiagnosticArray]) -> str:
     return f'The simulation had contacts between arm and person, greatest forces: {pairs}.'
 
 
-def _rates(client: DemoClient) -> Array:
-    """Return the rates that were published and when, up to the last joint state, (n, 2)."""
-    rates = [(time, status.rate) for time, status in client.statuses]
-    rates.append((seconds_of(client.observed[-1].header.stamp), rates[-1][1]))
+def _spans(client: DemoClient) -> list[Span]:
+    """Return how fast the arm was from one status to the next, from the first state on."""
     begin = seconds_of(client.observed[0].header.stamp)
-    return np.array([(max(time - begin, 0.0), rate) for time, rate in rates])
+    last = seconds_of(client.observed[-1].header.stamp) - begin
+    times = [min(max(time - begin, 0.0), last) for time, _ in client.statuses] + [last]
+    return [
+        Span(begin=since, end=until, rate=status.rate, state=status.state, part=status.box)
+        for (since, until), (_, status) in zip(pairwise(times), client.statuses, strict=True)
+        if until > since
+    ]
+
+
+def _seen_beside(
+    client: DemoClient, separation: Separation, frame: str
+) -> tuple[Instant, list[Span]]:
+    """Return the arm and the person when it was slowed down most, and how fast it was when."""
+    spans, arm = _spans(client), client.arm
+    begin = seconds_of(client.observed[0].header.stamp)
+    bodies = [_body(data) for data in client.bodies]
+    measured = np.array([_measured(body) for body in bodies])
+    commitments = [
+        (seconds_of(msg.header.stamp), joint_trajectory_from_msg(msg, client.joint_names))
+        for msg in client.commitments
+    ]
+
+    target = _example(f'target_{PERSON_TARGETS[-1]}', PointStamped)
+
+    def instant_at(time: float) -> Instant:
+        """Return what the arm had been given at a time after the first state [s]."""
+        given = [one for one in commitments if one[0] <= begin + time] or commitments[:1]
+        since, motion = given[-1]
+        k = max(0, int(np.searchsorted(measured, since, 'right')) - 1)
+        scene = scene_of(WearerBody().apply(bodies[k], math.inf, frame))
+        ages = np.full(len(scene.boxes), max(begin + time - measured[k], 0.0))
+        elapsed = min(max(begin + time - since, 0.0), motion.duration)
+        return Instant(
+            time=time,
+            seen=SeenBody(scene, ages, reach_of(scene.names, separation.rules)),
+            rules=separation.rules,
+            left=part(motion, elapsed, motion.duration),
+            target=goal_from_msg(target, frame).target,
+        )
+
+    def named(span: Span) -> Span:
+        """Say of a slowed arm which part is nearest to where it would be met, if nothing did."""
+        if span.part or span.state is not SeparationState.SLOWED:
+            return span
+        at = instant_at(span.begin)
+        left = reserves(arm, at)
+        nearest = int(left.argmin())
+        return replace(span, part=at.seen.scene.names[nearest] if left[nearest] < np.inf else '')
+
+    moving = [span for span in spans if span.rate > 0.0] or spans
+    slowest = min(moving, key=lambda span: span.rate)
+    return instant_at(slowest.begin), [named(span) for span in spans]
 
 
 def _aims_at(client: DemoClient, target: Array, q: Array) -> bool:

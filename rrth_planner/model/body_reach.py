@@ -15,8 +15,8 @@ Lines = tuple[Line, ...]
 # of where it was seen, in 99.99 % of the pairs of frames 0.1 to 0.6 s apart of CMU motions 62_01,
 # 62_07 and 62_13 (one person at work), a little widened by takes of other people. The first line
 # of each meets the second one about 0.1 s after a sight. Legs are of that person only, shins and
-# feet of six takes of him: no lower at any time than their greatest speeds in `BODY_SPEEDS`. Any other part
-# (no words) may be any of these.
+# feet of six takes of him: no lower at any time than their greatest speeds in `BODY_SPEEDS`. Any
+# other part (no words) may be any of these.
 BODY_REACH: tuple[tuple[str, Lines], ...] = (
     ('head', ((0.0, 1.3), (0.1, 0.25))),
     ('neck', ((0.0, 0.5), (0.03, 0.15))),

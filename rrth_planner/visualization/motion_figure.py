@@ -15,12 +15,13 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.joint_range import turns_near
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import MotionLimits, sample, Trajectory
-from rrth_planner.visualization.arm_view import draw_motion
+from rrth_planner.visualization.arm_view import draw_motion, SHAPE
+from rrth_planner.visualization.separation_view import draw_instant, draw_spans, Instant, Span
 
 JOINT_COLOURS = ('#1b6ca8', '#d1495b', '#2f9e6e', '#c98a1b', '#7a4fa3', '#4c5560')
 LIMIT, GRID, DASHES = '#30343b', '#e4e6ea', (0, (5, 3))
-# Of a motion, and height of the rates below all of them [inch].
-ROW_SIZE, STRIP = (13.0, 5.4), 2.2
+# Of a motion, and of what was seen beside a person [inch].
+ROW_SIZE = (13.0, 5.4)
 TIME_STEP = 0.005
 LEGEND: dict[str, Any] = {'fontsize': 8, 'frameon': False, 'columnspacing': 1.2}
 
@@ -41,7 +42,7 @@ def motion_figure(
     motions: Sequence[Motion],
     limits: MotionLimits,
     ray_guard_length: float,
-    rates: Array | None = None,
+    beside: tuple[Instant, list[Span]] | None = None,
 ) -> Figure:
     """
     Return a figure of motions, a row each: left the arm on its wearer, right the joints' curves.
@@ -52,13 +53,12 @@ def motion_figure(
         Drawn as dashed lines, in the colours of the joints.
     ray_guard_length : float
         How much of the pointing ray stays clear in motion [m].
-    rates : ndarray, shape (n, 2), optional
-        Times [s], and the rate of motions beside a wearer who moves from then on [-]; drawn below.
+    beside : (Instant, list of Span), optional
+        What was seen beside a wearer who moves: an instant, and how fast the arm was; drawn below.
 
     """
-    n = len(motions)
-    strip = 0.0 if rates is None else STRIP
-    figure = Figure(figsize=(ROW_SIZE[0], ROW_SIZE[1] * n + strip), facecolor='white')
+    n = len(motions) + (beside is not None)
+    figure = Figure(figsize=(ROW_SIZE[0], ROW_SIZE[1] * n), facecolor='white')
     FigureCanvasAgg(figure)
     height = figure.get_figheight()
     rows = figure.add_gridspec(
@@ -68,7 +68,7 @@ def motion_figure(
         left=0.0,
         right=0.985,
         top=1.0 - 0.75 / height,
-        bottom=(0.6 + strip) / height,
+        bottom=0.6 / height,
         wspace=0.1,
         hspace=0.3,
     )
@@ -83,20 +83,21 @@ def motion_figure(
         _draw_curves(position, velocity, arm, motion.trajectory, limits)
         title = f'Pointing at "{motion.label}"\n{motion.caption}'.rstrip()
         position.set_title(title, loc='left', fontsize=11, fontweight='bold')
-    if rates is not None:
-        axes = figure.add_axes((0.06, 0.55 / height, 0.925, (strip - 0.85) / height))
-        _draw_rates(axes, rates)
+    if beside is not None:
+        instant, spans = beside
+        view = figure.add_subplot(rows[-1, 0], projection='3d')
+        draw_instant(view, arm, instant, ray_guard_length, SHAPE)
+        explained = 'orange: how far the nearest parts may get before the arm is at rest'
+        view.set_title(explained, fontsize=9, color=LIMIT, y=1.04)
+        rate = figure.add_subplot(rows[-1, 1])
+        draw_spans(rate, spans)
+        title = (
+            'Beside a person at work: how fast the arm may go on,\n'
+            f'and which part slows it; left at {instant.time:.1f} s'
+        )
+        rate.set_title(title, loc='left', fontsize=11, fontweight='bold')
+        plain(rate)
     return figure
-
-
-def _draw_rates(axes: Axes, rates: Array) -> None:
-    axes.step(rates[:, 0], rates[:, 1], where='post', color=JOINT_COLOURS[0], lw=2.0)
-    axes.set_title('Beside a person at work', loc='left', fontsize=11, fontweight='bold')
-    axes.set_xlabel('time [s]')
-    axes.set_ylabel('rate [-]')
-    axes.set_xlim(rates[0, 0], rates[-1, 0])
-    axes.set_ylim(0.0, 1.05)
-    plain(axes)
 
 
 def _draw_curves(

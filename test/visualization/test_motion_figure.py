@@ -38,8 +38,8 @@ SCENE = Scene(
 FOLDED = np.array([0.0, -0.35, np.pi / 2, np.pi / 2])
 
 
-def picture(n_motions, rates=None):
-    """Return a figure of some motions, and of rates, drawn."""
+def picture(n_motions, beside=None):
+    """Return a figure of some motions, and of what was seen beside a person, drawn."""
     T = tool_pose(ARM, FOLDED - 0.4)
     trajectory = Trajectory(
         times=[0.0, 1.0],
@@ -53,7 +53,7 @@ def picture(n_motions, rates=None):
         target=T[:3, 3] + T[:3, 2],
         caption='0.80 rad in 1.00 s',
     )
-    figure = motion_figure(ARM, SCENE, [motion] * n_motions, LIMITS, 1.0, rates)
+    figure = motion_figure(ARM, SCENE, [motion] * n_motions, LIMITS, 1.0, beside)
     figure.canvas.draw()
     return figure
 
@@ -72,15 +72,6 @@ def test_each_motion_has_a_view_and_two_plots_whose_axes_carry_units(n_motions):
         assert 'lamp' in position.get_title(loc='left')
         names = [text.get_text() for text in position.get_legend().get_texts()]
         assert names == ['joint 1', 'joint 2', 'joint 3', 'joint 4', 'limits']
-
-
-def test_rates_are_drawn_below_all_motions():
-    rates = np.array([[0.0, 1.0], [0.4, 0.25], [2.0, 0.25]])
-    *above, below = picture(2, rates).axes
-    assert len(above) == 6
-    assert (below.get_xlabel(), below.get_ylabel()) == ('time [s]', 'rate [-]')
-    np.testing.assert_array_equal(below.lines[0].get_xydata(), rates)
-    assert below.get_position().y1 < min(axes.get_position().y0 for axes in above)
 
 
 def test_limits_have_the_colours_of_their_joints():
