@@ -59,7 +59,7 @@ class Instant:
     ----------
     left : Trajectory
         What is left of that, up to its end at rest.
-    target : ndarray, shape (3,)
+    target : ndarray, shape (3,), optional
         [m].
 
     """
@@ -68,7 +68,7 @@ class Instant:
     seen: SeenBody
     rules: SeparationRules
     left: Trajectory
-    target: Array
+    target: Array | None = None
 
 
 def reserves(arm: ArmModel, instant: Instant) -> Array:
@@ -129,7 +129,7 @@ def draw_spans(axes: Any, spans: list[Span]) -> None:
         if part and end - begin > NAMED * whole:
             place = {'ha': 'center', 'va': 'bottom', 'rotation': 90, 'fontsize': LEGEND_SIZE}
             axes.text(0.5 * (begin + end), 0.02, part, **place)
-    axes.set_xlabel('time [s]')
+    axes.set_xlabel('time [s]', loc='left')
     axes.set_ylabel('rate of the planned motion [-]')
     axes.set_xlim(spans[0].begin, spans[-1].end)
     axes.set_ylim(0.0, 1.02)

@@ -4,6 +4,7 @@
 
 from argparse import Namespace
 from dataclasses import replace
+import time
 from types import SimpleNamespace
 
 import numpy as np
@@ -19,7 +20,10 @@ from rrth_planner.execution.separation_status import (  # noqa: E402
     SeparationStatus,
 )
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
-from rrth_planner.model.scene import Scene  # noqa: E402
+from rrth_planner.model.arm import tool_pose  # noqa: E402
+from rrth_planner.model.curves import part  # noqa: E402
+from rrth_planner.model.scene import Box, Scene  # noqa: E402
+from rrth_planner.model.separation import SeparationRules  # noqa: E402
 from rrth_planner.visualization.viewer.live_page import LivePage, STATE_COLOURS  # noqa: E402
 from rrth_planner.visualization.viewer.panel import CHART_PERIOD, CHART_SPAN, RateChart  # noqa: E402
 from rrth_planner.visualization.viewer.scene_view import TIMED  # noqa: E402
@@ -41,18 +45,48 @@ def drawn_colour(page):
     return np.unique(np.asarray(line.colors).reshape(-1, 3), axis=0).tolist()
 
 
+def feed_of(scene, **values):
+    """Return what a page shows: an arm in motion beside a wearer."""
+    seen = {
+        'arm': ARM,
+        'ray_guard_length': 1.0,
+        'margin': 0.02,
+        'scene': scene,
+        'target': None,
+        'positions': ARM.bounds.mean(axis=0),
+        'trajectory': MOTION,
+        'separation': None,
+        'rules': SeparationRules(),
+        'given': None,
+        'said': '',
+    }
+    return SimpleNamespace(**seen | values)
+
+
+def test_how_far_parts_near_a_moving_arm_may_get_is_drawn_until_it_is_at_rest(server):
+    motion = part(MOTION, 0.2, 0.7)
+    place = tool_pose(ARM, motion.positions[0])[:3, 3] + [0.3, 0.0, 0.0]
+    scene = Scene((Box('head', place, [0.1, 0.1, 0.1], np.eye(3)),))
+    feed = feed_of(scene, given=(time.monotonic(), motion))
+
+    def drawn():
+        """Return the boxes that another page draws."""
+        page = LivePage(server, feed)
+        page.draw()
+        return page.view.reach
+
+    # Nobody has said that motions are separate from him.
+    assert drawn() == []
+    feed.separation = SeparationStatus()
+    (box,) = drawn()
+    least, most = 0.1 + 2.0 * 0.1, 0.1 + 2.0 * (0.1 + 0.25 * (motion.duration + 0.1) + 0.05)
+    assert least < box.dimensions[0] < most
+    feed.given = time.monotonic() - motion.duration, motion
+    assert drawn() == []
+
+
 def test_the_motion_has_the_colour_of_its_state_and_the_rate_is_drawn_once_there_is_one(server):
-    feed = SimpleNamespace(
-        arm=ARM,
-        ray_guard_length=1.0,
-        margin=0.02,
-        scene=Scene(()),
-        target=None,
-        positions=ARM.bounds.mean(axis=0),
-        trajectory=MOTION,
-        separation=None,
-        said='',
-    )
+    feed = feed_of(Scene(()))
     page = LivePage(server, feed)
     page.draw()
     assert page.panel.rate.plot is None

@@ -59,6 +59,9 @@ class ViewerFeed(Node):
         parameters = declare_parameters(self)
         self.arm, self.margin = parameters.arm, parameters.margin
         self.ray_guard_length = parameters.ray_guard_length
+        separation = parameters.execution.separation
+        # What is assumed of a wearer who moves; None: motions are not separated from him.
+        self.rules = None if separation is None else separation.rules
         self._frame = parameters.base_frame
         self._inputs = Inputs(
             *(self.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))
@@ -79,8 +82,10 @@ class ViewerFeed(Node):
         self.separation: SeparationStatus | None = None
         self._targets = self.create_publisher(PointStamped, 'target', LATCHED)
         self._client = self.create_client(Trigger, SERVICE)
-        # The last motion that was published.
+        # The last motion that was published; when the arm was given it, or a stretch of it, by a
+        # clock that never steps [s], and that.
         self.trajectory: Trajectory | None = None
+        self.given: tuple[float, Trajectory] | None = None
         self._shown: tuple[WearerBody | None, Scene] = (None, Scene(()))
         # Of requests: written by the page's threads, read by the executor's.
         self._lock = Lock()
@@ -179,18 +184,20 @@ class ViewerFeed(Node):
             self.get_logger().warning(f'{self._states.topic_name} rejected: {problem}')
 
     def _on_planned_motion(self, msg: JointTrajectory, arrival: Arrival) -> None:
-        self._is_separated = False
+        given, self._is_separated = self.given, False
         self._on_motion(msg, arrival)
-        self._is_separated = True
+        self.given, self._is_separated = given, True
 
     def _on_motion(self, msg: JointTrajectory, _: Arrival) -> None:
-        if self._is_separated:
-            # A stretch of the planned motion, which is shown.
-            return
         try:
-            self.trajectory = joint_trajectory_from_msg(msg, self.arm.joint_names)
+            motion = joint_trajectory_from_msg(msg, self.arm.joint_names)
         except MessageError as problem:
             self._reject(problem)
+            return
+        self.given = time.monotonic(), motion
+        if not self._is_separated:
+            # Else it is a stretch of the planned motion, which is shown.
+            self.trajectory = motion
 
     def _reject(self, problem: MessageError) -> None:
         self.get_logger().warning(f'joint_trajectory rejected: {problem}')

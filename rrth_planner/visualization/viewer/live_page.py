@@ -7,7 +7,10 @@ from typing import Any, NoReturn
 
 import numpy as np
 from rrth_planner.io.urdf.placed_robot import PlacedRobot
+from rrth_planner.model.curves import part
+from rrth_planner.model.separation import reach_of, SeenBody
 from rrth_planner.ros.client.viewer_feed import ViewerFeed
+from rrth_planner.visualization.separation_view import grown_parts, Instant
 from rrth_planner.visualization.viewer.curves import tool_positions, trajectory_curve
 from rrth_planner.visualization.viewer.panel import Panel
 from rrth_planner.visualization.viewer.scene_view import SceneView
@@ -15,6 +18,8 @@ import viser
 
 # Of the picture [s].
 FRAME_PERIOD = 1.0 / 30.0
+# Of what is drawn of the wearer's reach [s].
+REACH_PERIOD = 0.1
 # Colours of a motion that is slowed down or stopped for a wearer who moves, by the state.
 STATE_COLOURS = {'SLOWED': (232, 138, 32), 'PROTECTIVE_STOP': (209, 50, 70), 'FAULT': (30, 30, 30)}
 
@@ -31,6 +36,9 @@ class LivePage:
         self._is_dragged = False
         self.view = SceneView(server, feed.arm, feed.ray_guard_length, robot)
         self.view.layers['start'].visible = False
+        self.view.layers['reach'] = server.scene.add_frame('/reach', show_axes=False)
+        # When to draw next how far parts may get [s].
+        self._reach_due = -np.inf
         self.panel = Panel(server, self.view.layers, is_live=True)
         self.view.target.on_update(self._on_drag)
         self.panel.on_target(lambda target: feed.ask(target))
@@ -64,10 +72,29 @@ class LivePage:
             curve = trajectory_curve(feed.arm, trajectory)
             corners = tool_positions(feed.arm, trajectory.positions[[0, -1]])
             self.view.show_path('timed', curve, corners, colour)
+        self._draw_reach(time.monotonic())
         said = feed.said
         if self._drawn.get('said') != said:
             self._drawn['said'] = said
             self.panel.say(said)
+
+    def _draw_reach(self, now: float) -> None:
+        """Draw how far parts of a wearer who moves may get before the arm is at rest [s]."""
+        feed, boxes = self._feed, []
+        if now < self._reach_due:
+            return
+        self._reach_due = now + REACH_PERIOD
+        if feed.rules is not None and feed.separation is not None and feed.given is not None:
+            came, motion = feed.given
+            scene = feed.scene
+            if now < came + motion.duration:
+                # Bodies are a few hundredths of a second old, which is not seen here.
+                ages = np.zeros(len(scene.boxes))
+                seen = SeenBody(scene, ages, reach_of(scene.names, feed.rules))
+                left = part(motion, now - came, motion.duration)
+                instant = Instant(time=now, seen=seen, rules=feed.rules, left=left)
+                boxes = grown_parts(feed.arm, instant)
+        self.view.show_reach(boxes)
 
     def _is_new(self, what: str, value: Any) -> bool:
         is_new = what not in self._drawn or self._drawn[what] is not value

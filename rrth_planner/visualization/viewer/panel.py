@@ -24,6 +24,7 @@ SHOWN = {
     'first': 'first path',
     'short': 'path after shortcuts',
     'timed': 'trajectory with corner blends',
+    'reach': 'how far the nearest parts may get before the arm is at rest',
     'meshes': 'meshes of the URDF',
 }
 BRAND = (59, 111, 182)
@@ -163,7 +164,7 @@ class Panel:
             self.repeat = gui.add_checkbox('repeat', False)
         with gui.add_folder('Show'):
             for name, layer in layers.items():
-                if not is_live or name in ('margin', 'timed'):
+                if not is_live or name in ('margin', 'timed', 'reach'):
                     box = gui.add_checkbox(SHOWN[name], True)
                     box.on_update(partial(_show, layer))
 

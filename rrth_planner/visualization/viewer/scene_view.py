@@ -9,7 +9,7 @@ import numpy as np
 from rrth_planner.io.urdf.placed_robot import PlacedRobot
 from rrth_planner.model.arm import ArmModel, capsule_ends, pointing_error, tool_pose
 from rrth_planner.model.arrays import Array
-from rrth_planner.model.scene import Scene
+from rrth_planner.model.scene import Box, Scene
 from rrth_planner.planning.result import Tree
 from rrth_planner.visualization.arm_view import arm_points, ray_of
 from rrth_planner.visualization.viewer.curves import (
@@ -24,6 +24,7 @@ from viser.extras import ViserUrdf
 
 Color = tuple[int, int, int]
 CLOTH, SKIN, SHELL = (126, 147, 178), (227, 184, 152), (70, 110, 170)
+REACH = (224, 122, 47)
 BAR, JOINT, GHOST, RAY = (38, 43, 52), (232, 138, 32), (110, 116, 128), (209, 50, 70)
 TARGET = (242, 183, 5)
 # The trees from the start and from the goals; the path as found, shortened, and in time.
@@ -132,6 +133,11 @@ class SceneView:
         """The wearer's boxes as they are drawn."""
         return self._drawn.get('body', [])
 
+    @property
+    def reach(self) -> list[Any]:
+        """What is drawn of how far parts of the wearer may get."""
+        return self._drawn.get('reach', [])
+
     def show_body(self, scene: Scene, margin: float) -> None:
         """Draw the wearer's boxes, each in a shell of the margin [m]."""
         add = self._scene.add_box
@@ -145,6 +151,19 @@ class SceneView:
             shells.append(add(f'/margin/{k}', SHELL, box.size + 2.0 * margin, **unlit, **place))
         self._replace('body', boxes)
         self._replace('margin', shells)
+
+    def show_reach(self, boxes: Sequence[Box]) -> None:
+        """Draw how large parts of the wearer may have got, in a layer of their own."""
+        style: Any = {'opacity': 0.18, 'cast_shadow': False, 'receive_shadow': False}
+        self._replace(
+            'reach',
+            [
+                self._scene.add_box(
+                    f'/reach/{k}', REACH, b.size, position=b.center, wxyz=wxyz(b.rotation), **style
+                )
+                for k, b in enumerate(boxes)
+            ],
+        )
 
     def move_body(self, scene: Scene, margin: float) -> None:
         """Draw the wearer's boxes as `show_body` does, moving those that are drawn already."""
