@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whom the arm is beside: a torso that stands, hands that wander, and that reach for the arm."""
 
+from bisect import bisect_right
 from collections.abc import Callable
 
 import numpy as np
+from rrth_planner.kernels.layout import SIZE
 from rrth_planner.model.arrays import Array
 from rrth_planner.rehearsal.world import BEGIN
 
@@ -63,8 +65,13 @@ class Hand:
 
     def place_at(self, time: float) -> Array:
         """Return where it is, or was [s], (3,) [m]."""
-        places = np.array(self._places)
-        return np.array([np.interp(time, self._times, places[:, k]) for k in range(3)])
+        times, places = self._times, self._places
+        k = bisect_right(times, time)
+        if k in (0, len(times)):
+            return places[max(k - 1, 0)]
+        velocity = (places[k] - places[k - 1]) / (times[k] - times[k - 1])
+        place: Array = velocity * (time - times[k - 1]) + places[k - 1]
+        return place
 
     def _reach(self, now: float, speed: float) -> None:
         """Go where the arm will be, and a little further."""
@@ -102,14 +109,14 @@ class Person:
             direction[0] = abs(direction[0])
             far = float(rng.uniform(*FIRST_SEEN)) * direction / np.linalg.norm(direction)
             self.others.append(Hand(rng, far, aim))
-        self._turn = np.eye(3).ravel()
+        size, place = TORSO
+        turn = np.eye(3).ravel()
+        hands = [np.concatenate([AWAY, HAND, turn])] * (len(self.names) - 1)
+        self._rows = np.array([np.concatenate([place, size, turn]), *hands])
 
     def rows_at(self, time: float) -> Array:
         """Return torso and hands at a time [s], (5, 15)."""
-        size, place = TORSO
-        torso = np.concatenate([place, size, self._turn])
-        hands = [
-            np.concatenate([hand.place_at(time), HAND, self._turn])
-            for hand in (self.hand, *self.others)
-        ]
-        return np.array([torso, *hands])
+        rows = self._rows.copy()
+        for row, hand in zip(rows[1:], (self.hand, *self.others), strict=True):
+            row[:SIZE] = hand.place_at(time)
+        return rows
