@@ -17,10 +17,12 @@ from pathlib import Path
 import sys
 import time
 
+from rrth_planner.io.replaced_file import replace_file
 from rrth_planner.rehearsal.contacts import AT_REST, FAST, SLOW
 from rrth_planner.rehearsal.ray_time import CLASSES
 from tqdm import tqdm
 
+from benchmarks.common.sections import VIRTUAL_TIME, with_section
 from benchmarks.people.beside import HANDS, LENGTH, RATES, Row, row_of, scenarios, STOPS
 
 # Causes of lost time that are printed.
@@ -64,6 +66,30 @@ def ray_lines(wholes: Sequence[Row]) -> list[str]:
     return lines
 
 
+def tables_of(rows: Sequence[Row], wholes: Sequence[Row], whole: Row) -> list[str]:
+    """Return the tables of some rows, of the sums by rate and hands, and of all."""
+    total = sum(whole.lost.values())
+    lost = sorted(whole.lost.items(), key=lambda item: -item[1])[:MOST_CAUSES]
+    outcomes = ', '.join(f'{n} {what}' for what, n in whole.outcomes.most_common())
+    digest = hashlib.sha256(''.join(whole.digests).encode()).hexdigest()
+    return [
+        f'{HEADER}\n|{" --- |" * (HEADER.count("|") - 1)}',
+        *map(line_of, rows),
+        *map(line_of, wholes),
+        '\nRay across a part, arm in motion, of 240 s [s], by how it began:\n',
+        *ray_lines(wholes),
+        f'\nWhat became of targets: {outcomes}.\n',
+        '| time lost [s] | share [%] | the arm | for |\n| --- | --- | --- | --- |',
+        *(
+            f'| {seconds:.0f} | {100.0 * seconds / total:.1f} | {doing} | {cause or "–"} |'
+            for (doing, cause), seconds in lost
+        ),
+        '',
+        *(f'- {sentence}' for sentence in whole.sentences),
+        f'Digest: `{digest[:16]}`.',
+    ]
+
+
 def _percent(n: int, of: int) -> str:
     return f'{100.0 * n / max(of, 1):.1f} %'
 
@@ -93,29 +119,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
             rows.setdefault(key, Row(*key)).add(row)
     whole = Row('all', math.nan, math.nan)
     wholes = {(r, h): Row('all', r, h) for r in RATES for h in options.hands}
-    print(f'Stops {options.stop}, seeds {options.seed} on\n')
-    print(f'{HEADER}\n|{" --- |" * (HEADER.count("|") - 1)}')
     for row in rows.values():
         whole.add(row)
         wholes[row.rate, row.hands].add(row)
-        print(line_of(row))
-    print(*map(line_of, wholes.values()), sep='\n')
-    print('\nRay across a part, arm in motion, of 240 s [s], by how it began:\n')
-    print(*ray_lines(tuple(wholes.values())), sep='\n')
-    print('\nWhat became of targets: ', end='')
-    print(', '.join(f'{n} {what}' for what, n in whole.outcomes.most_common()))
-    print('\n| time lost [s] | share [%] | the arm | for |\n| --- | --- | --- | --- |')
-    total = sum(whole.lost.values())
-    lost = sorted(whole.lost.items(), key=lambda item: -item[1])
-    for (doing, cause), seconds in lost[:MOST_CAUSES]:
-        print(f'| {seconds:.0f} | {100.0 * seconds / total:.1f} | {doing} | {cause or "–"} |')
-    print(*whole.sentences, sep='\n')
-    digest = hashlib.sha256(''.join(whole.digests).encode()).hexdigest()
-    print(
-        f'\n{whole.seconds / 3600.0:.2f} h in {whole.cpu / 60.0:.1f} core-minutes '
-        f'({whole.seconds / whole.cpu:.1f} times real time a core), '
-        f'{(time.monotonic() - begin) / 60.0:.1f} min in all; digest {digest}'
+    words = f'--hands {" ".join(map("{:g}".format, options.hands))} --seconds {options.seconds:g}'
+    text = '\n'.join(
+        [
+            f'Written by `python -m benchmarks.people FOLDER {words} --seeds {n} --stop '
+            f'{options.stop} --seed {options.seed}`.\n',
+            *tables_of(list(rows.values()), tuple(wholes.values()), whole),
+            f'\n{whole.seconds / 3600.0:.2f} h in {whole.cpu / 60.0:.1f} core-minutes '
+            f'({whole.seconds / whole.cpu:.1f} times real time a core), '
+            f'{(time.monotonic() - begin) / 60.0:.1f} min in all.',
+        ]
     )
+    print(text)
+    if options.page is not None:
+        page = options.page.read_text(encoding='utf-8')
+        title = f'{VIRTUAL_TIME}, stops {options.stop}'
+        new = with_section(page, title, text)
+        replace_file(options.page, lambda path: path.write_text(new, encoding='utf-8'))
     return int(bool(whole.sentences))
 
 
@@ -136,6 +159,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     add('--seconds', type=float, default=LENGTH, help='of each run [s] (%(default)s)')
     add('--stop', choices=STOPS, default='4/40', help='stop limits (%(default)s)')
+    add('--page', type=Path, help='with a section of its own for the tables')
     add('--seed', type=int, default=0, help='of the first run (%(default)s)')
     add('--jobs', type=int, default=os.cpu_count(), help='processes (%(default)s)')
     return parser

@@ -44,7 +44,9 @@ def _run(options: argparse.Namespace) -> int:
 
     from benchmarks.common.processors import OnEachProcessor, stay_awake
     from benchmarks.common.real_time import is_real_time
+    from benchmarks.common.sections import section_of, VIRTUAL_TIME, with_section
     from benchmarks.common.standstill import StandstillWatch
+    from benchmarks.people.beside import STOPS
     from benchmarks.soak.flood import FloodRecord, soak_floods
     from benchmarks.soak.monitor import soak_monitor
     from benchmarks.soak.people import PersonRecord, soak_people
@@ -85,6 +87,10 @@ def _run(options: argparse.Namespace) -> int:
     if plans and plans.memory:
         draw_memory(plans.memory, target.parent / 'images' / 'reliability')
     text = report(plans, monitor, _command(options), options.remark, watch.found, floods, people)
+    before = target.read_text(encoding='utf-8') if target.exists() else ''
+    for title in (f'{VIRTUAL_TIME}, stops {stop}' for stop in STOPS):
+        if kept := section_of(before, title):
+            text = with_section(text, title, kept)
     replace_file(target, lambda path: path.write_text(text, encoding='utf-8'))
     print(text.partition('## Plans')[0])
     print(f'{target}: written')
