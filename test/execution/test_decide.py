@@ -7,26 +7,34 @@ import pickle
 import re
 
 from decisions import (
+    ARM,
     at_later,
     BEGIN,
     begun,
     body,
+    DELAY,
     GOAL,
     hand,
     idle,
     moment,
     on,
     RULES,
+    SEPARATION,
     turn,
 )
 import numpy as np
 import pytest
+from rrth_planner.collision.reference_checker import bars
 from rrth_planner.execution import decide as module, event as events, fail_safe_stop
-from rrth_planner.execution.decide import decide
+from rrth_planner.execution.commitments import ExecutionRules
+from rrth_planner.execution.decide import decide, PATIENCE, SOON_IN_THE_WAY
 from rrth_planner.execution.watch import MonitorState, PendingStop, Watch
 from rrth_planner.model.errors import RequestError
+from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.status import ErrorCode
+from rrth_planner.model.trajectory import Trajectory
 from same_values import differences
+from worlds import FOLDED
 
 MOTION = turn()
 END = BEGIN + MOTION.duration
@@ -232,6 +240,39 @@ def test_a_stop_is_commanded_though_what_is_said_of_it_fails(monkeypatch):
         assert not found.command.motion.trajectory.velocities[-1].any()
         assert found.watch.state is MonitorState.STOPPING
         assert 'ZeroDivisionError' in found.lines[-1].text
+
+
+@pytest.mark.parametrize('is_separated', [False, True])
+def test_for_where_the_wearer_may_be_soon_only_a_motion_without_a_stop_ahead_is_stopped(
+    is_separated,
+):
+    rules = RULES
+    if is_separated:
+        rules = replace(RULES, execution=ExecutionRules(SEPARATION, DELAY, False))
+    still = np.zeros((2, ARM.dof))
+    swing = Trajectory(
+        times=[0.0, 1.5],
+        positions=[FOLDED, FOLDED + [0.9, 0.0, 0.0, 0.0]],
+        velocities=still,
+        accelerations=still,
+    )
+    at = moment(BEGIN, FOLDED, rules=rules)
+    # Near enough for a commitment that is not the whole motion.
+    tip = bars(ARM, swing.positions[:1], 0.0)[0, -2, 1]
+    near = Scene((Box('hand', tip - [0.4, 0.4, 0.0], [0.05] * 3, np.eye(3)),))
+    watch = decide(idle(rules), body(at, near)).watch
+    watch, given = begun(watch, swing, at, rules)
+    assert watch.commitments.is_active == is_separated
+    assert not (is_separated and watch.commitments.is_whole)
+    # For longer than it may go on for although he is in the way.
+    watch = replace(watch, in_the_way_since=BEGIN - 2.0 * PATIENCE)
+    now = BEGIN + 0.05
+    found = decide(watch, body(on(given, now, rules), near, hand(swing, 0.15)))
+    if is_separated:
+        assert found.next is None
+        return
+    assert isinstance(found.next, events.StopFor)
+    assert found.next.why == SOON_IN_THE_WAY
 
 
 @pytest.mark.parametrize('is_fault', [True, False])

@@ -976,21 +976,6 @@ def test_a_hand_that_comes_into_the_ray_has_the_arm_slow_down_before(separated, 
     assert np.abs(arm.commanded(arm.now)[0] - arm.motion.positions[-1]).max() > 1e-2
 
 
-def test_a_forecast_ends_no_motion_that_has_a_stop_ahead_of_it(separated):
-    arm, hand = beside(separated, 0.3)
-    n, here = len(arm.published), Scene((in_the_ray(),))
-    arm.inputs.expected_scene = lambda: here
-    arm.frames(60, hand)
-    # The arm is given nothing that leads into him, and no stop beside that which it has.
-    assert 'stopped' not in arm.said
-    check_ray(arm, n, here.boxes[0])
-    # The hand has turned back: so far the goal is not given up.
-    arm.inputs.expected_scene = lambda: Scene(())
-    arm.frames(600, hand)
-    assert 'stopped' not in arm.said
-    assert np.abs(arm.commanded(arm.now)[0] - arm.motion.positions[-1]).max() < 1e-6
-
-
 def test_where_the_controller_rejects_commitments_the_one_that_it_executes_is_continued(separated):
     arm, hand = beside(separated, 0.2, 25)
     # From here on nothing reaches the controller for a while.
