@@ -272,7 +272,11 @@ def kernel(
 
     def decorate(function: Callable[..., Any]) -> Any:
         # References are counted only where there are arrays to be freed; a kernel that makes one
-        # in another way than these does not compile.
+        # in another way than these does not compile, and none is handed one by another.
+        if _has_arrays(signature.return_type):
+            raise TypeError(
+                f'{function.__name__}: returns an array, which its caller may not free'
+            )
         makes_arrays = not ARRAY_MAKERS.isdisjoint(function.__code__.co_names)
         compiled = njit(**options, _nrt=makes_arrays)(function)
         if not config.DISABLE_JIT:
@@ -288,6 +292,13 @@ def kernel(
         return compiled
 
     return decorate
+
+
+def _has_arrays(kind: Any) -> bool:
+    """Return whether values of a type are arrays, or hold some."""
+    if isinstance(kind, types.BaseTuple):
+        return any(map(_has_arrays, kind))
+    return isinstance(kind, types.Array)
 
 
 class _InnerKernel(CPUDispatcher):

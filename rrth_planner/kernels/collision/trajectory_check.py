@@ -55,21 +55,26 @@ def prove_pieces(curves, speeds, curvatures, first, begin, resolution, chain, ro
     return -1
 
 
-@kernel(OUT_MAT(*NEW), is_inner=True)
-def packed(boxes, allowed, T_arm_base, growth, depth):
-    """Return newly received boxes (m, 15) as groups, as `rows_of` and `pack` in `boxes` do."""
+@kernel(int64(int64), is_inner=True)
+def n_groups(depth):
+    """Return how many groups of boxes a tree of a depth has."""
+    return (LANES**depth - 1) // (LANES - 1)
+
+
+@kernel(void(*NEW, OUT_MAT), is_inner=True)
+def pack_new(boxes, allowed, T_arm_base, growth, depth, groups):
+    """Write newly received boxes (m, 15) as groups, as `rows_of` and `pack` in `boxes` do."""
     n = boxes.shape[0]
     rows, lanes = np.empty((BOX_ROWS, n)), np.empty(n, dtype=np.int64)
-    groups = np.empty(((LANES**depth - 1) // (LANES - 1), BOX_ROWS * LANES))
     rows_of(boxes, allowed, T_arm_base, growth, rows)
     pack(rows, depth, groups, lanes)
-    return groups
 
 
 @kernel(boolean(VEC, float64, int64, MAT, *NEW), is_short=True)
 def is_place_free(q, ray_length, address, robot, boxes, allowed, T_arm_base, growth, depth):
     """Return whether the arm at q (dof,) is free of newly received boxes and itself, as below."""
-    groups = packed(boxes, allowed, T_arm_base, growth, depth)
+    groups = np.empty((n_groups(depth), BOX_ROWS * LANES))
+    pack_new(boxes, allowed, T_arm_base, growth, depth, groups)
     return is_configuration_free(q, ray_length, as_chain(address), robot, groups)
 
 
@@ -104,7 +109,8 @@ def is_remaining_motion_free(
     n_pieces, dof, chain = positions.shape[0] - 1, positions.shape[1], as_chain(address)
     curves = np.empty((n_pieces, 6, dof))
     fit(times, positions, velocities, accelerations, curves)
-    groups = packed(boxes, allowed, T_arm_base, growth, depth)
+    groups = np.empty((n_groups(depth), BOX_ROWS * LANES))
+    pack_new(boxes, allowed, T_arm_base, growth, depth, groups)
     q_end = np.empty(dof)
     for k in range(dof):
         q_end[k] = 0.0
