@@ -54,7 +54,7 @@ def scenario_of(name, **changes):
 # How long each of them is rehearsed: until what it is about has happened [s].
 SECONDS = {
     'recorded_person': 20.0,
-    'intercepting_hand': 26.0,
+    'intercepting_hand': 32.0,
     'lost_hand': 29.0,
     'dead_planner': 24.0,
 }
