@@ -296,7 +296,10 @@ class Episode:
             # As a request: a rest that is a little aside, after a message that was missed, is not
             # noticed, and the controller holds what it is taken to hold.
             q = command.trajectory.positions[-1]
-        before, end = self.found.n_begun, np.clip(q + 0.05, *the_arm().bounds)
+        ends = [np.clip(q + way, *the_arm().bounds) for way in (0.05, -0.05)]
+        # Where the torso is in both ways nothing is asked but that the motion begins.
+        free = [end for end in ends if self._is_way_free(q, end)]
+        before, end = self.found.n_begun, (free or ends)[0]
         motion = parameterize(Path(np.array([q, end])), (), self._separation.limits)
         for _ in range(40):
             begin = world.timeline.now + ahead(world.rules.execution.controller_delay)
@@ -307,9 +310,9 @@ class Episode:
         arrived = self.judge.states[-1].positions
         if self.found.n_begun == before:
             self.judge.blame('no motion begins any more')
-        elif np.abs(arrived - end).max() > 1e-3 and not self._is_arm_in_torso(q):
+        elif free and np.abs(arrived - end).max() > 1e-3:
             self.judge.blame('a motion in the free does not arrive')
 
-    def _is_arm_in_torso(self, q: Array) -> bool:
-        free = arm_world(the_arm(), self.world.scene, MARGIN, RAY)
-        return not free.is_free(q)
+    def _is_way_free(self, begin: Array, end: Array) -> bool:
+        """Return whether the arm and its ray are free of the wearer from begin to end, (dof,)."""
+        return arm_world(the_arm(), self.world.scene, MARGIN, RAY).is_edge_valid(begin, end)

@@ -5,25 +5,22 @@
 import gc
 import tracemalloc
 
+from numba import types
 import numpy as np
 import pytest
-
-pytest.importorskip('numba')
-
-from numba import types  # noqa: E402
-from rrth_planner.collision.world import world_of  # noqa: E402
-from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
-from rrth_planner.execution.expected_wearer import expected_scene, is_expected_free  # noqa: E402
-from rrth_planner.execution.remaining_motion import (  # noqa: E402
+from rrth_planner.collision.world import world_of
+from rrth_planner.execution.executing_motion import ExecutingMotion
+from rrth_planner.execution.expected_wearer import expected_scene, is_expected_free
+from rrth_planner.execution.remaining_motion import (
     box_in_ray,
     escapes_by_continuing,
     is_place_free,
     is_remaining_free,
 )
-from rrth_planner.kernels.jit import kernel, OUT_MAT  # noqa: E402
-from rrth_planner.model.required_clearance import RequiredClearance  # noqa: E402
-from rrth_planner.model.trajectory import Trajectory  # noqa: E402
-from worlds import FOLDED, table_1_arm, wearer  # noqa: E402
+from rrth_planner.kernels.jit import kernel, OUT_MAT
+from rrth_planner.model.required_clearance import RequiredClearance
+from rrth_planner.model.trajectory import Trajectory
+from worlds import FOLDED, table_1_arm, wearer
 
 REQUIRED, WEARER = RequiredClearance(table_1_arm(), 0.02, 1.0), wearer()
 MOTION = ExecutingMotion(

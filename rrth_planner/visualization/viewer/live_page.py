@@ -91,7 +91,8 @@ class LivePage:
                 # Bodies are a few hundredths of a second old, which is not seen here.
                 ages = np.zeros(len(scene.boxes))
                 seen = SeenBody(scene, ages, reach_of(scene.names, feed.rules))
-                left = part(motion, now - came, motion.duration)
+                # It may have come after this time was read.
+                left = part(motion, max(now - came, 0.0), motion.duration)
                 instant = Instant(time=now, seen=seen, rules=feed.rules, left=left)
                 boxes = grown_parts(feed.arm, instant)
         self.view.show_reach(boxes)
