@@ -170,7 +170,7 @@ def _run(options: argparse.Namespace) -> None:
         if not options.physics:
             stack.enter_context(started('wearer', 'cli.wearer', PERSON))
         client.wait_for_nodes()
-        separation, error = _beside_a_person(client, frame)
+        separation, error, wanted = _beside_a_person(client, frame)
     # Once nobody else needs the processors.
     beside = _sentences(client, separation, frame, error)
     if options.physics:
@@ -182,7 +182,7 @@ def _run(options: argparse.Namespace) -> None:
         motions,
         settings.limits,
         settings.ray_guard_length,
-        _seen_beside(client, separation, frame),
+        _seen_beside(client, separation, frame, wanted),
     )
     figure.savefig(options.output, dpi=DOTS_PER_INCH)
     print('\n' + '\n'.join([HEADER, *lines, *beside]))
@@ -241,11 +241,14 @@ def _checked_error(client: DemoClient, name: str, target: Array) -> float:
     return error
 
 
-def _beside_a_person(client: DemoClient, frame: str) -> tuple[Separation, float]:
+def _beside_a_person(
+    client: DemoClient, frame: str
+) -> tuple[Separation, float, list[tuple[float, Array]]]:
     """
     Point beside a person at work, and keep what is published meanwhile.
 
-    Return what the planner assumes, and by how much the ray misses the targets at most [m].
+    Return what the planner assumes, by how much the ray misses the targets at most [m], and each
+    target, (3,) [m], with when it was wanted [s].
     """
     separation = parameters_of_planner(client).execution.separation
     if separation is None:
@@ -253,17 +256,19 @@ def _beside_a_person(client: DemoClient, frame: str) -> tuple[Separation, float]
     client.see_separation()
     client.wait_for(lambda: bool(client.bodies), 'body_boxes of the person at work')
     client.wait_for(lambda: bool(client.statuses), 'rrth_planner/state')
-    client.observed, errors = [], []
+    client.observed, errors, wanted = [], [], []
     for name in PERSON_TARGETS:
         message = _example(f'target_{name}', PointStamped)
         target = goal_from_msg(message, frame).target
+        now = seconds_of(client.observed[-1].header.stamp) if client.observed else -math.inf
+        wanted.append((now, target))
         client.publish(message)
         client.point(partial(_aims_at, client, target))
         errors.append(_checked_error(client, name, target))
     # Bodies that were measured until the last state may still be on their way.
     last = seconds_of(client.observed[-1].header.stamp)
     client.wait_for(lambda: _measured(_body(client.bodies[-1])) >= last, 'body_boxes')
-    return separation, max(errors)
+    return separation, max(errors), wanted
 
 
 def _sentences(client: DemoClient, separation: Separation, frame: str, error: float) -> list[str]:
@@ -316,7 +321,10 @@ def _spans(client: DemoClient) -> list[Span]:
 
 
 def _seen_beside(
-    client: DemoClient, separation: Separation, frame: str
+    client: DemoClient,
+    separation: Separation,
+    frame: str,
+    wanted: Sequence[tuple[float, Array]],
 ) -> tuple[Instant, list[Span]]:
     """Return the arm and the person when it was slowed down most, and how fast it was when."""
     spans, arm = _spans(client), client.arm
@@ -327,8 +335,6 @@ def _seen_beside(
         (seconds_of(msg.header.stamp), joint_trajectory_from_msg(msg, client.joint_names))
         for msg in client.commitments
     ]
-
-    target = _example(f'target_{PERSON_TARGETS[-1]}', PointStamped)
 
     def instant_at(time: float) -> Instant:
         """Return what the arm had been given at a time after the first state [s]."""
@@ -343,7 +349,7 @@ def _seen_beside(
             seen=SeenBody(scene, ages, reach_of(scene.names, separation.rules)),
             rules=separation.rules,
             left=part(motion, elapsed, motion.duration),
-            target=goal_from_msg(target, frame).target,
+            target=[target for since, target in wanted if since <= begin + time][-1],
         )
 
     def named(span: Span) -> Span:

@@ -183,21 +183,25 @@ class ViewerFeed(Node):
         except MessageError as problem:
             self.get_logger().warning(f'{self._states.topic_name} rejected: {problem}')
 
-    def _on_planned_motion(self, msg: JointTrajectory, arrival: Arrival) -> None:
-        given, self._is_separated = self.given, False
-        self._on_motion(msg, arrival)
-        self.given, self._is_separated = given, True
+    def _on_planned_motion(self, msg: JointTrajectory, _: Arrival) -> None:
+        if (motion := self._motion_of(msg)) is not None:
+            self.trajectory, self._is_separated = motion, True
 
     def _on_motion(self, msg: JointTrajectory, _: Arrival) -> None:
-        try:
-            motion = joint_trajectory_from_msg(msg, self.arm.joint_names)
-        except MessageError as problem:
-            self._reject(problem)
+        if (motion := self._motion_of(msg)) is None:
             return
         self.given = time.monotonic(), motion
         if not self._is_separated:
             # Else it is a stretch of the planned motion, which is shown.
             self.trajectory = motion
+
+    def _motion_of(self, msg: JointTrajectory) -> Trajectory | None:
+        """Return the motion of a message; None, with a warning: it is none."""
+        try:
+            return joint_trajectory_from_msg(msg, self.arm.joint_names)
+        except MessageError as problem:
+            self._reject(problem)
+            return None
 
     def _reject(self, problem: MessageError) -> None:
         self.get_logger().warning(f'joint_trajectory rejected: {problem}')
